@@ -232,3 +232,76 @@ fn data_of(bytes: &Bytes, header: usize, name: &[u8]) -> Result<usize, Error> {
     }
     Ok(header + 30 + named + extra)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Limits;
+
+    /// An archive of one stored file whose numbers are in the zip64 records.
+    fn wide(content: &[u8]) -> Vec<u8> {
+        let checksum = crc32fast::hash(content).to_le_bytes();
+        let unknown = [0xFF; 4];
+        let length = (content.len() as u64).to_le_bytes();
+        let local = [
+            &b"PK\x03\x04\x2d\0\0\0\0\0\0\0\0\0"[..],
+            &checksum,
+            &unknown,
+            &unknown,
+            b"\x01\0\0\0a",
+        ];
+        let mut file = [&local.concat()[..], content].concat();
+        let directory = file.len() as u64;
+        // Length, packed length, place of the local header.
+        let extra = [&b"\x01\0\x18\0"[..], &length, &length, &[0; 8]].concat();
+        let record = [
+            &b"PK\x01\x02\x2d\0\x2d\0\0\0\0\0\0\0\0\0"[..],
+            &checksum,
+            &unknown,
+            &unknown,
+            b"\x01\0\x1c\0\0\0\0\0\0\0\0\0\0\0",
+            &unknown,
+            b"a",
+        ];
+        file.extend(record.concat());
+        file.extend(extra);
+        let end = file.len() as u64;
+        file.extend(b"PK\x06\x06");
+        file.extend([0; 28]);
+        file.extend(1_u64.to_le_bytes());
+        file.extend((end - directory).to_le_bytes());
+        file.extend(directory.to_le_bytes());
+        file.extend(b"PK\x06\x07\0\0\0\0");
+        file.extend(end.to_le_bytes());
+        file.extend([0; 4]);
+        file.extend(b"PK\x05\x06\0\0\0\0\xFF\xFF\xFF\xFF");
+        file.extend([0xFF; 8]);
+        file.extend([0; 2]);
+        file
+    }
+
+    #[test]
+    fn numbers_of_64_bits_are_read() {
+        let archive = Archive::open(wide(b"content")).expect("an archive");
+        let file = archive.find("a").expect("the file");
+        let budget = &mut Budget::new(Limits::default());
+        assert_eq!(archive.unpack(file, budget), Ok(b"content".to_vec()));
+    }
+
+    #[test]
+    fn a_file_with_another_checksum_is_refused() {
+        let mut bytes = wide(b"content");
+        let at = bytes
+            .windows(7)
+            .position(|of| of == b"content")
+            .expect("the content");
+        bytes[at] = b'C';
+        let archive = Archive::open(bytes).expect("an archive");
+        let refused = archive.unpack(0, &mut Budget::new(Limits::default()));
+        let error = refused.expect_err("another checksum").to_string();
+        assert!(
+            error.contains("entry `a`") && error.contains("checksum"),
+            "{error}"
+        );
+    }
+}

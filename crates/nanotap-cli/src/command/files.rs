@@ -13,7 +13,7 @@ use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{number, page, style};
 
-/// Files of which the notes and images are printed too.
+/// Most files that are listed with their notes and images.
 const DETAILED: usize = 3;
 
 /// List what the files of instruments hold.

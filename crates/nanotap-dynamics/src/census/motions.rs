@@ -16,7 +16,7 @@ use crate::control::CancelFlag;
 use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
 use crate::map::StroboscopicMap;
 use crate::orbit::search::merge;
-use crate::orbit::{PeriodicOrbit, close_orbit};
+use crate::orbit::{PeriodicOrbit, Stability, close_orbit};
 
 /// Largest number of runs on the map itself from states that coarse runs reached.
 const MAX_EXACT_RUNS: usize = 8;
@@ -160,7 +160,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         for (period, state) in seeds {
             let closed = close_orbit(&mut self.exact, state, *period, &self.options.shooting);
             let Ok(orbit) = closed else { continue };
-            let known = if orbit.is_stable() {
+            let known = if orbit.known_stability() == Stability::Stable {
                 &mut self.orbits
             } else {
                 &mut self.unstable

@@ -167,6 +167,7 @@ mod tests {
                 .collect(),
             log_determinant: 0.0,
             stability: Stability::Marginal,
+            margin: 0.0,
             discrete: 0,
         }
     }

@@ -171,6 +171,7 @@ mod tests {
                 multipliers: Vec::new(),
                 log_determinant: 0.0,
                 stability: Stability::Marginal,
+                margin: 0.0,
                 discrete: 0,
             },
             arclength: 0.0,

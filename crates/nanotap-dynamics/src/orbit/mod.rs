@@ -39,8 +39,10 @@ pub struct PeriodicOrbit {
     /// Natural logarithm of |det DPⁿ|, summed over the factors: an independent check of the
     /// multipliers and of a trace formula.
     pub log_determinant: f64,
-    /// Stability according to the multipliers.
+    /// Stability according to the multipliers, with the margin [`MARGIN`](multipliers::MARGIN).
     pub stability: Stability,
+    /// Distance from the unit circle within which the side of a multiplier is not known.
+    pub margin: f64,
     /// Number of trailing entries of a state that are whole numbers set by the map
     /// ([`StroboscopicMap::discrete_entries`](crate::StroboscopicMap::discrete_entries)). Sizes and
     /// distances do not include them.
@@ -75,6 +77,7 @@ impl PeriodicOrbit {
             multipliers: vec![Complex::new(0.0, 0.0); dimension],
             log_determinant: f64::NEG_INFINITY,
             stability: Stability::Stable,
+            margin: 0.0,
             discrete: 0,
         }
     }
@@ -93,6 +96,12 @@ impl PeriodicOrbit {
     /// [`MARGIN`](multipliers::MARGIN).
     pub fn is_stable(&self) -> bool {
         self.stability == Stability::Stable
+    }
+
+    /// Stability as far as the multipliers are known: of an orbit that slow relaxations approach, some
+    /// are nearer to the unit circle than [`MARGIN`](multipliers::MARGIN), and inside all the same.
+    pub fn known_stability(&self) -> Stability {
+        multipliers::stability_of(&self.multipliers, self.margin)
     }
 
     /// Largest entry of any state, in units of the state.

@@ -579,6 +579,7 @@ impl Segments {
             residual,
             error,
             stability: multipliers.stability(),
+            margin: multipliers.margin,
             multipliers: multipliers.values,
             log_determinant: multipliers.log_determinant,
             discrete: self.discrete,

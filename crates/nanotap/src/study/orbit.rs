@@ -371,6 +371,7 @@ fn report_on(
         Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
     };
     let agrees = determinant_defect <= allowed_defect(orbit);
+    let stability = orbit.known_stability();
     Ok(OrbitReport {
         period: orbit.period,
         state: start,
@@ -379,9 +380,9 @@ fn report_on(
         error: orbit.error,
         decay_periods: decay_periods(&pairs(&orbit.multipliers), orbit.period),
         multipliers: pairs(&orbit.multipliers),
-        stable: agrees && orbit.is_stable(),
+        stable: agrees && stability == Stability::Stable,
         stability: if agrees {
-            orbit.stability.name()
+            stability.name()
         } else {
             "undecided"
         },

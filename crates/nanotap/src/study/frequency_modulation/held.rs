@@ -374,6 +374,7 @@ impl At {
             // The bordered system is well conditioned: what the residual leaves is of its size.
             error: residual,
             stability: multipliers.stability(),
+            margin: multipliers.margin,
             multipliers: multipliers.values,
             log_determinant: multipliers.log_determinant,
             discrete: ModelMap::new(&self.model).discrete_entries(),

@@ -55,6 +55,14 @@ pub(crate) fn studies() -> Vec<(&'static str, &'static str, &'static str, String
     registry::STUDIES.iter().map(row).collect()
 }
 
+/// The JSON schema of a study's report, in which columns have `x-unit` and `x-label`.
+#[pyfunction]
+pub(crate) fn report_schema(name: &str) -> PyResult<String> {
+    let entry = registry::study(name);
+    let entry = entry.ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
+    Ok((entry.report)().as_value().to_string())
+}
+
 /// A table of measured values from a CSV file, as JSON.
 #[pyfunction]
 pub(crate) fn table(path: PathBuf) -> PyResult<String> {

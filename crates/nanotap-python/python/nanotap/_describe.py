@@ -52,6 +52,17 @@ def describe(ds: "xr.Dataset") -> "xr.Dataset":
     return ds
 
 
+@cache
+def declared(study: str, rows: str) -> dict[str, dict[str, str]]:
+    """`long_name` and `units` of the columns of a report's rows, as Rust declares them."""
+    fields = json.loads(_nanotap.report_schema(study))["$defs"][rows]["properties"]
+    return {
+        name: {"long_name": one["x-label"].split(" $")[0], "units": one["x-unit"]}
+        for name, one in fields.items()
+        if "x-label" in one
+    }
+
+
 @lru_cache(maxsize=64)
 def _labels(dim: str, names: tuple[str, ...]) -> "PandasIndex":
     """A cached index of labels: making one takes longer than many motions."""

@@ -1,6 +1,7 @@
 """Results of physical cases in SI."""
 
 import json
+import math
 from typing import TYPE_CHECKING
 
 from ._describe import name_in_si
@@ -22,6 +23,8 @@ def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
     return {
         "g0": (length, "m"),
         "sqrt(m L^4/EI)": (time, "s"),
+        # Angular frequencies, shown as frequencies.
+        "sqrt(EI/(m L^4))": (1 / (2 * math.pi * time), "Hz"),
         "g0 sqrt(EI/(m L^4))": (length / time, "m/s"),
         "EI g0/L^3": (force, "N"),
         "EI g0^2/L^3": (energy, "J"),

@@ -9,7 +9,7 @@ import numpy as np
 from . import _arguments, _datasets, _nanotap
 from ._arguments import Progress
 from ._case import Case, Path
-from ._describe import case_attributes, describe
+from ._describe import case_attributes, declared, describe
 from ._interrupt import Interrupted, part_of, stoppable
 from ._motions import _cased, _document, words
 from ._progress import bar
@@ -277,39 +277,15 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ds[name].attrs.update(long_name="distance to the sample over g0", units="1")
     if "branch_parameter" in ds:
         ds["branch_parameter"].attrs["units"] = "g0"
+    readings, in_si = (declared("fm", of) for of in ("Modulated", "ModulatedInSi"))
+    for reading in map(str, ds.variables):
+        bare = reading.removeprefix("physical_")
+        of = readings if bare == reading else in_si
+        ds[reading].attrs.update(of.get(bare, {}))
     ds = describe(ds.drop_vars("branch_parameter_si", errors="ignore"))
     if case.is_physical and not case._core.model_units:
         ds = ds.swap_dims({name: "zc"})
     return answered(case, ds)
-
-
-# Units of what a scan records.
-_SCANNED = {
-    "surface": ("height of the surface under the tip", "m"),
-    "height": ("height: the scanner's extension", "m"),
-    "amplitude_error": ("amplitude less setpoint", "m"),
-    "phase": ("phase lag", "degree"),
-    "peak_force": (
-        "mean peak force: mean over the pixel of the largest force in each period",
-        "N",
-    ),
-    "peak_force_max": ("largest peak force in the pixel", "N"),
-    "dissipation": ("energy dissipated in the sample in one drive period", "J"),
-    "contact_fraction": ("contact time / period", "1"),
-    "mean_deflection": ("time mean of the tip deflection", "m"),
-    "state": ("attractive, repulsive, free or irregular", "1"),
-}
-_LISTED = {
-    "x": "m",
-    "surface": "m",
-    "z": "m",
-    "amplitude": "m",
-    "phase": "degree",
-    "amplitude_lockin": "m",
-    "phase_lockin": "degree",
-    "peak_force": "N",
-    "dissipation": "J",
-}
 
 
 @stoppable()
@@ -344,8 +320,7 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         rows = np.array(_of_ways(report, ways, name))
         if rows.dtype.kind == "O":
             rows = rows.astype(float)
-        words_, unit = _SCANNED.get(name, (name, "1"))
-        attrs = {"long_name": words_, "units": unit}
+        attrs = declared("scan", "Channels")[name]
         variables[name] = (("direction", "y", "x"), rows, attrs)
     length = report["size"][0]
     pixels = variables["height"][1].shape[-1] if variables else 0
@@ -360,11 +335,11 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         listed = [
             np.nan if row[name] is None else row[name] for row in report["periods"]
         ]
+        entry = ("k", np.array(listed), declared("scan", "ListedPeriod")[name])
         if name == "k":
-            coords["k"] = ("k", np.array(listed), {"units": "drive periods"})
+            coords["k"] = entry
         else:
-            attrs = {"units": _LISTED.get(name, "1")}
-            variables[f"period_{name}"] = ("k", np.array(listed), attrs)
+            variables[f"period_{name}"] = entry
     ds = xr.Dataset(variables, coords)
     ds.attrs.update(case_attributes(case, "scan"))
     for name, value in report.items():

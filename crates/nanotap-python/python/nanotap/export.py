@@ -41,6 +41,8 @@ def table(result: Any) -> pd.DataFrame:
         raise TypeError(message)
     if "period_max" in result.variables:
         return _frame(result, tuple(map(str, result.classification.dims)))
+    if "way" in result.dims:
+        return _frame(result, tuple(map(str, result.classification.dims)))
     if "attractor" in result.variables:
         return _frame(result, tuple(map(str, result.attractor.dims)))
     for dim in ("point", "tau"):

@@ -1,10 +1,13 @@
 //! What most studies take: a case, a request, and where table and picture go.
 
 use clap::Args;
+use nanotap::case::Case;
+use nanotap::frame::Frame;
 use nanotap::study::Study;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
+use crate::file;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
@@ -50,5 +53,17 @@ impl<S: Study> StudyArguments<S> {
         self.out.check()?;
         self.plot.check()?;
         Ok(options)
+    }
+
+    /// Writes the table and the figure of a report where `--out` and `--plot` want them.
+    pub(crate) fn write(&self, case: &Case, report: &S::Report) -> Result<(), Failure> {
+        let table = || S::frames(case, report).first().map(Frame::csv);
+        self.out.write(|| table().unwrap_or_default())?;
+        match &self.plot.plot {
+            Some(path) => {
+                S::figure(case, report).map_or(Ok(()), |figure| file::draw(path, &figure))
+            }
+            None => Ok(()),
+        }
     }
 }

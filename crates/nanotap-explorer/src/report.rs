@@ -4,6 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::key::Section;
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Key, Value as Stated};
+use nanotap::frame::Frame;
 use serde_json::{Map, Value, json};
 
 /// Rows of a table that are shown.
@@ -42,6 +43,21 @@ pub(crate) fn tables(document: &Value, schema: &Value) -> Vec<Value> {
 /// A table as the page reads it: heads with their meanings, and rows of cells.
 pub(crate) fn table(title: &str, heads: &[(&str, &str)], rows: &[Value]) -> Value {
     json!({ "title": title, "heads": heads, "rows": rows })
+}
+
+/// A frame as a table: the heads and cells of the terminal, with labels as their meanings.
+pub(crate) fn of_frame(frame: &Frame<'_>) -> Value {
+    let columns = frame.shown_columns();
+    let titles: Vec<String> = columns.iter().map(|column| frame.head(column)).collect();
+    let heads = titles.iter().zip(&columns);
+    let heads: Vec<(&str, &str)> = heads
+        .map(|(title, c)| (title.as_str(), &*c.label))
+        .collect();
+    let rows = (0..frame.rows.min(MAX_ROWS)).map(|k| {
+        let cells: Vec<String> = columns.iter().map(|c| frame.text(c, k)).collect();
+        row(&cells, None)
+    });
+    table(frame.name, &heads, &rows.collect::<Vec<_>>())
 }
 
 /// A row of cells. With changes to the case, a click on it makes them.
@@ -106,9 +122,13 @@ impl<'a> Field<'a> {
             let ends = [format!(", {unit}"), format!(" in {unit}")];
             ends.iter().any(|end| words.ends_with(end))
         };
-        let kind = Kind::ALL
-            .into_iter()
-            .find(|kind| *kind != Kind::Number && ends(kind.si_unit()));
+        // Declared with the column; else the unit ends the sentence.
+        let kind = match own["x-unit"].as_str() {
+            Some(unit) => Kind::of_si_unit(unit),
+            None => Kind::ALL
+                .into_iter()
+                .find(|kind| *kind != Kind::Number && ends(kind.si_unit())),
+        };
         Self { node, words, kind }
     }
 

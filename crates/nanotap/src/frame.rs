@@ -52,12 +52,6 @@ impl AsCell for usize {
     }
 }
 
-impl AsCell for u64 {
-    fn cell(&self) -> Cell {
-        Cell::Count(*self as usize)
-    }
-}
-
 impl AsCell for bool {
     fn cell(&self) -> Cell {
         Cell::Count(usize::from(*self))
@@ -129,6 +123,8 @@ impl Form {
     /// A number of this dimension as text, in SI or in the model's own units.
     fn text(self, dimension: Dimension, si: bool, value: f64) -> String {
         let kind = dimension.kind().filter(|_| si);
+        let is_angle = dimension == Dimension::Angle && !matches!(self, Self::Decimals(_));
+        let value = if is_angle { shown_phase(value) } else { value };
         match (self, kind) {
             (Self::Plain, _) => shortest(value),
             (Self::Decimals(decimals), _) => format!("{value:.decimals$}"),
@@ -138,11 +134,6 @@ impl Form {
             (Self::Quantity([_, digits]) | Self::Prefixed(digits), Some(kind)) => {
                 kind.format_digits(value, digits)
             }
-            (Self::Quantity([digits, _]) | Self::Prefixed(digits) | Self::Digits(digits), _)
-                if dimension == Dimension::Angle =>
-            {
-                significant(shown_phase(value), digits)
-            }
             (Self::Quantity([digits, _]) | Self::Prefixed(digits) | Self::Digits(digits), _) => {
                 significant(value, digits)
             }
@@ -150,23 +141,10 @@ impl Form {
     }
 }
 
-/// What a column holds, and how it is shown.
-#[derive(Clone, Copy, Debug)]
-pub struct Shown {
-    dimension: Dimension,
-    form: Form,
-}
-
-impl From<(Dimension, Form)> for Shown {
-    fn from((dimension, form): (Dimension, Form)) -> Self {
-        Self { dimension, form }
-    }
-}
-
-impl From<Form> for Shown {
+impl From<Form> for (Dimension, Form) {
     /// Of words, counts and pure numbers.
     fn from(form: Form) -> Self {
-        Self::from((Dimension::Number, form))
+        (Dimension::Number, form)
     }
 }
 
@@ -262,7 +240,7 @@ macro_rules! rows {
 pub(crate) use rows;
 
 /// Adds columns to [`Rows`], a line each: `"name", "head", shown => cell;` or `.method(…);`, with
-/// [`Form`] and [`Dimension`] in scope.
+/// [`Form`], [`Dimension`] and [`Align`] in scope.
 macro_rules! columns {
     (@ $rows:expr;) => { $rows };
     (@ $rows:expr; .$method:ident($($argument:tt)*); $($more:tt)*) => {
@@ -278,9 +256,16 @@ macro_rules! columns {
 }
 pub(crate) use columns;
 
+/// As [`columns!`], to the finished [`Frame`].
+macro_rules! frame {
+    ($($columns:tt)*) => { $crate::frame::columns! { $($columns)* .frame(); } };
+}
+pub(crate) use frame;
+
 /// What declarations of columns name.
 pub(crate) mod prelude {
     #![allow(unused_imports, reason = "each declaration needs some of them")]
+    pub(crate) use super::Align::*;
     pub(crate) use super::Form::*;
     pub(crate) use crate::case::quantity::Kind;
     pub(crate) use crate::observe::Dimension::{self, *};
@@ -303,8 +288,6 @@ pub struct Column<'a> {
     pub dimension: Dimension,
     /// How it is shown.
     pub form: Form,
-    /// Whether files in SI have it in eV, too.
-    in_ev: bool,
     /// Whether its numbers are in SI, whatever the units of the frame.
     in_si: bool,
     only_in_files: bool,
@@ -324,57 +307,21 @@ pub struct Frame<'a> {
     pub rows: usize,
     /// Units in which the numbers are shown; None: they are in SI.
     units: Option<Units>,
-    shown: Cow<'static, [&'static str]>,
+    shown: Cow<'static, str>,
     align: [Align; 2],
 }
 
 impl<'a> Frame<'a> {
-    /// The frame, of which readers are shown the columns with these names or heads, in this order;
-    /// without this, all that are not only in files.
-    #[must_use]
-    pub fn shown(mut self, names: impl Into<Cow<'static, [&'static str]>>) -> Self {
-        self.shown = names.into();
-        self
-    }
-
-    /// The frame with another alignment of quantities, by default to the right, and of other
-    /// numbers, by default at the point.
-    #[must_use]
-    pub fn aligned(self, quantities: Align, numbers: Align) -> Self {
-        let align = [quantities, numbers];
-        Self { align, ..self }
-    }
-
-    /// The frame with the columns of these names aligned to the right.
-    #[must_use]
-    pub fn right(mut self, names: &[&str]) -> Self {
-        for column in &mut self.columns {
-            if names.contains(&&*column.name) {
-                column.align = Some(Align::Right);
-            }
-        }
-        self
-    }
-
-    /// The frame without the columns of these names.
-    #[must_use]
-    pub fn without(mut self, names: &[&str]) -> Self {
-        self.columns
-            .retain(|column| !names.contains(&&*column.name));
-        self
-    }
-
     /// The columns that readers are shown.
     pub fn shown_columns(&self) -> Vec<&Column<'a>> {
         if self.shown.is_empty() {
             return self.columns.iter().filter(|c| !c.only_in_files).collect();
         }
-        let named = |name: &&str| {
-            self.columns
-                .iter()
-                .find(|c| c.name == *name || c.head == *name)
+        let named = |name: &str| {
+            let is_it = |c: &&Column<'a>| c.name == name || c.head == name;
+            self.columns.iter().find(is_it)
         };
-        self.shown.iter().filter_map(named).collect()
+        self.shown.split(',').filter_map(named).collect()
     }
 
     /// The cell of a column, in the unit of [`Frame::unit`].
@@ -439,35 +386,27 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The table as CSV: every named column, in SI with the units in the heads and with observed
-    /// energies in eV, too.
+    /// The table as CSV: every named column, in SI with the units in the heads.
     pub fn csv(&self) -> String {
-        let mut columns: Vec<(&Column<'_>, FileUnit)> = Vec::new();
-        for c in self.columns.iter().filter(|c| !c.name.is_empty()) {
-            columns.push((
-                c,
-                c.in_files
-                    .unwrap_or((|value| value, self.unit(c.dimension))),
-            ));
-            if c.in_ev && self.is_si() {
-                columns.push((c, (|joules| joules / JOULES_PER_ELECTRONVOLT, "eV")));
-            }
-        }
-        let head = |(c, (_, unit)): &(&Column<'_>, FileUnit)| match *unit {
-            _ if !self.is_si() => c.name.to_string(),
-            "" => c.si_name.to_string(),
-            unit => format!("{} ({unit})", c.si_name),
-        };
-        let mut csv = columns.iter().map(head).collect::<Vec<_>>().join(",") + "\n";
-        for row in 0..self.rows {
-            let cell = |(c, (convert, _)): &(&Column<'_>, FileUnit)| match self.cell(c, row) {
-                Cell::Empty => String::new(),
-                Cell::Word(word) => word,
-                Cell::Count(count) => count.to_string(),
-                Cell::Number(value) if self.is_si() => shortest(convert(value)),
-                Cell::Number(value) => shortest(value),
+        let columns = self.columns.iter().filter(|c| !c.name.is_empty());
+        let head =
+            |c: &Column<'_>| match c.in_files.map_or(self.unit(c.dimension), |(_, unit)| unit) {
+                _ if !self.is_si() => c.name.to_string(),
+                "" => c.si_name.to_string(),
+                unit => format!("{} ({unit})", c.si_name),
             };
-            csv += &(columns.iter().map(cell).collect::<Vec<_>>().join(",") + "\n");
+        let mut csv = columns.clone().map(head).collect::<Vec<_>>().join(",") + "\n";
+        for row in 0..self.rows {
+            let cell = |c: &Column<'_>| match (self.cell(c, row), c.in_files) {
+                (Cell::Empty, _) => String::new(),
+                (Cell::Word(word), _) => word,
+                (Cell::Count(count), _) => count.to_string(),
+                (Cell::Number(value), Some((convert, _))) if self.is_si() => {
+                    shortest(convert(value))
+                }
+                (Cell::Number(value), _) => shortest(value),
+            };
+            csv += &(columns.clone().map(cell).collect::<Vec<_>>().join(",") + "\n");
         }
         csv
     }
@@ -479,7 +418,7 @@ pub struct Rows<'a, R> {
     frame: Frame<'a>,
 }
 
-impl<'a, R: Copy + 'a> Rows<'a, R> {
+impl<'a, R: Clone + 'a> Rows<'a, R> {
     /// Creates a frame of rows in the model's units, shown in `units`; without these the rows are in
     /// SI.
     pub fn new(
@@ -493,7 +432,7 @@ impl<'a, R: Copy + 'a> Rows<'a, R> {
             columns: Vec::new(),
             rows: rows.len(),
             units,
-            shown: Cow::Borrowed(&[]),
+            shown: "".into(),
             align: [Align::Right, Align::Point],
         };
         Self { rows, frame }
@@ -505,11 +444,11 @@ impl<'a, R: Copy + 'a> Rows<'a, R> {
         mut self,
         name: impl Into<Cow<'static, str>>,
         head: impl Into<Cow<'static, str>>,
-        shown: impl Into<Shown>,
+        shown: impl Into<(Dimension, Form)>,
         of: impl Fn(R) -> C + 'a,
     ) -> Self {
         let (name, head, rows) = (name.into(), head.into(), Rc::clone(&self.rows));
-        let Shown { dimension, form } = shown.into();
+        let (dimension, form) = shown.into();
         self.frame.columns.push(Column {
             si_name: name.clone(),
             name,
@@ -517,12 +456,11 @@ impl<'a, R: Copy + 'a> Rows<'a, R> {
             head,
             dimension,
             form,
-            in_ev: false,
             in_si: false,
             only_in_files: false,
             align: None,
             in_files: None,
-            of: Box::new(move |row| of(rows[row]).cell()),
+            of: Box::new(move |row| of(rows[row].clone()).cell()),
         });
         self
     }
@@ -539,7 +477,7 @@ impl<'a, R: Copy + 'a> Rows<'a, R> {
         self
     }
 
-    /// Adds the single numbers of a set of observables; energies in SI in eV, too.
+    /// Adds the single numbers of a set of observables; in SI files energies in eV, too.
     #[must_use]
     pub fn observed(
         mut self,
@@ -554,17 +492,51 @@ impl<'a, R: Copy + 'a> Rows<'a, R> {
                 _ => Form::Quantity([5, 4]),
             };
             let cell = move |row| of(row).and_then(|seen| (o.of)(seen).number());
-            self = self
-                .column(
-                    o.name,
-                    o.head.unwrap_or(o.si_name),
-                    (o.dimension, form),
-                    cell,
-                )
-                .label(o.label)
-                .si_name(o.si_name);
-            self.last().in_ev = o.dimension == Dimension::Energy;
+            let head = o.head.unwrap_or(o.si_name);
+            let add = |rows: Self| {
+                let rows = rows.column(o.name, head, (o.dimension, form), cell);
+                rows.label(o.label).si_name(o.si_name)
+            };
+            self = add(self);
+            if o.dimension == Dimension::Energy && self.frame.is_si() {
+                let ev: FileUnit = (|joules| joules / JOULES_PER_ELECTRONVOLT, "eV");
+                self = add(self).in_files(ev).only_in_files();
+            }
         }
+        self
+    }
+
+    /// Shows readers the columns with these names or heads, separated by commas, in this order; without
+    /// this, all that are not only in files.
+    #[must_use]
+    pub fn shown(mut self, names: impl Into<Cow<'static, str>>) -> Self {
+        self.frame.shown = names.into();
+        self
+    }
+
+    /// Aligns quantities, by default to the right, and other numbers, by default at the point.
+    #[must_use]
+    pub fn aligned(mut self, quantities: Align, numbers: Align) -> Self {
+        self.frame.align = [quantities, numbers];
+        self
+    }
+
+    /// Aligns the columns of these names to the right.
+    #[must_use]
+    pub fn right(mut self, names: &[&str]) -> Self {
+        let columns = self.frame.columns.iter_mut();
+        for column in columns.filter(|column| names.contains(&&*column.name)) {
+            column.align = Some(Align::Right);
+        }
+        self
+    }
+
+    /// Leaves the columns of these names out.
+    #[must_use]
+    pub fn without(mut self, names: &[&str]) -> Self {
+        self.frame
+            .columns
+            .retain(|column| !names.contains(&&*column.name));
         self
     }
 

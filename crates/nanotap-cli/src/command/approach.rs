@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
-use nanotap::figure::approach::approach_figure;
 use nanotap::study::Study;
 use nanotap::study::approach::{ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::ModulationReport;
@@ -52,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 /// Writes table and figure of a curve of distances and prints it.
-pub(super) fn print<S: Study>(
+pub(super) fn print<S: Study<Report = ApproachReport>>(
     mut report: ApproachReport,
     case: &GivenCase,
     study: &StudyArguments<S>,
@@ -71,12 +70,7 @@ pub(super) fn print<S: Study>(
              sample: the model does not hold there",
         );
     }
-    study
-        .out
-        .write(|| report.motion_table(case.units()).csv())?;
-    study
-        .plot
-        .draw(|| approach_figure(&report, &case.units()))?;
+    study.write(case, &report)?;
     if let Some(branches) = &mut report.branches {
         points.shorten(branches, output);
     }

@@ -3,8 +3,6 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::figure::attractors::attractors_figure;
-use nanotap::observe::time_series;
 use nanotap::study::attractors::{
     Attractors, AttractorsStudy, CheckReport, EndReport, UnseenReport,
 };
@@ -29,17 +27,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
-    let model = case.model()?;
+    case.model()?;
     let found = progress::study::<AttractorsStudy>(&case, &request, &arguments.threads)?;
-    arguments.study.out.write(|| {
-        found
-            .state_table(time_series::state_names(&model), case.units())
-            .csv()
-    })?;
-    arguments
-        .study
-        .plot
-        .draw(|| attractors_figure(&model, &found, &case.units()))?;
+    arguments.study.write(&case, &found)?;
     if found.cancelled {
         output.warning("stopped before all starts were done: the fractions are of what was done");
     }

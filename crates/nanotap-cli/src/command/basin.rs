@@ -12,10 +12,9 @@ use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
-use crate::number;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::table::Table;
 
 /// Compute basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
@@ -100,33 +99,7 @@ fn text(case: &GivenCase, [x, y]: &[SliceRange; 2], done: &DatasetReport<Shares>
         x.name,
         y.name
     );
-    done.text(&heading, parts)
-}
-
-/// What part of the slice goes where.
-fn parts(shares: &Shares) -> String {
-    let mut table = Table::new([
-        ("", Align::Right),
-        ("attractor", Align::Left),
-        ("starts (%)", Align::Point),
-    ]);
-    let percent = |part: f64| number::significant(100.0 * part, 4);
-    for (k, attractor) in shares.attractors.iter().enumerate() {
-        let name = attractor.period.map_or_else(
-            || attractor.classification.clone(),
-            |period| format!("period {period}"),
-        );
-        table.row([(k + 1).to_string(), name, percent(attractor.fraction)]);
-    }
-    for (name, part) in [
-        ("none within the periods", shares.unsettled),
-        ("left every bound", shares.unbounded),
-        ("could not be followed", shares.failed),
-        ("behind the surface", shares.behind),
-    ] {
-        if part > 0.0 {
-            table.row([String::new(), name.to_owned(), percent(part)]);
-        }
-    }
-    table.render()
+    done.text(&heading, |shares| {
+        Table::all(&shares.share_table()).render()
+    })
 }

@@ -1,7 +1,6 @@
 //! `nanotap bimodal`: two tones with their loops against the distance.
 
 use nanotap::case::physical::Kind;
-use nanotap::figure::bimodal::bimodal_figure;
 use nanotap::study::bimodal::{BimodalPoint, BimodalReport, BimodalStudy};
 
 use crate::failure::Failure;
@@ -20,8 +19,7 @@ pub(crate) type Arguments = StudyArguments<BimodalStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let report = progress::study::<BimodalStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments.out.write(|| report.point_table().csv())?;
-    arguments.plot.draw(|| bimodal_figure(&report))?;
+    arguments.write(&case, &report)?;
     output.study(&case, &report, |report| text(&case, report))
 }
 

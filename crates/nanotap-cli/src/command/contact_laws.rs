@@ -2,7 +2,6 @@
 
 use nanotap::case::key::kind_of;
 use nanotap::case::physical::Kind;
-use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{Comparison, ContactLawsStudy, SampleMotion};
 
@@ -20,12 +19,7 @@ pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let result = progress::study::<ContactLawsStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments
-        .out
-        .write(|| result.loop_table(case.units()).csv())?;
-    arguments
-        .plot
-        .draw(|| sample_figure(&result, &case.units()))?;
+    arguments.write(&case, &result)?;
     output.study(&case, &result, |result| text(&case, result))
 }
 

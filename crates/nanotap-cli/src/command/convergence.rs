@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
-use nanotap::figure::motion::convergence_figure;
 use nanotap::study::convergence::{Convergence, ConvergenceStudy};
 
 use crate::failure::Failure;
@@ -20,12 +19,7 @@ pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let result = progress::study::<ConvergenceStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments
-        .out
-        .write(|| result.motion_table(case.units()).csv())?;
-    arguments
-        .plot
-        .draw(|| convergence_figure(&result, &case.units()))?;
+    arguments.write(&case, &result)?;
     output.notes(&result.notes);
     output.study(&case, &result, |result| text(&case, result))
 }

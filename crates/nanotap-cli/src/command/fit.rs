@@ -1,13 +1,11 @@
 //! `nanotap fit`: parameters of lever and sample from measured curves.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::Key;
 use nanotap::dataset::Share;
 use nanotap::figure::fit::{fit_figure, fit_map_figure};
-use nanotap::number::shortest;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedParameter};
 use serde::Serialize;
@@ -96,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 }
             }
             "toml" => file::write_case(path, &report.case_file)?,
-            _ => file::write(path, csv(&report).as_bytes())?,
+            _ => file::write(path, report.row_table().csv().as_bytes())?,
         }
     }
     if let Some(path) = &arguments.plot.plot {
@@ -211,42 +209,6 @@ fn of_curve(path: &Path, curve: &str, index: usize) -> PathBuf {
     path.with_file_name(format!("{}-{name}.toml", stem.unwrap_or_default()))
 }
 
-/// A row a row of the data.
-fn csv(report: &FitReport) -> String {
-    let mut header = vec!["curve".to_owned(), "line".to_owned()];
-    let unit = |unit: &str| match unit {
-        "1" => String::new(),
-        unit => format!(" ({unit})"),
-    };
-    header.push(format!("{}{}", report.swept, unit(&report.swept_unit)));
-    header.push("branch".to_owned());
-    for column in &report.columns {
-        let (name, unit) = (&column.name, unit(&column.unit));
-        header.push(format!("{name}{unit}"));
-        header.push(format!("{name} model{unit}"));
-        header.push(format!("{name} residual"));
-    }
-    let mut csv = header.join(",") + "\n";
-    let cell = |value: Option<f64>| value.map_or_else(String::new, shortest);
-    for row in &report.rows {
-        let branch = row.branch.map_or_else(String::new, |b| b.to_string());
-        let curve = row.curve.replace([',', '"', '\n'], " ");
-        let _ = write!(csv, "{curve},{},{},{branch}", row.line, shortest(row.at));
-        for column in &report.columns {
-            let reading = row.readings.get(&column.name);
-            let _ = write!(
-                csv,
-                ",{},{},{}",
-                cell(reading.and_then(|r| r.measured)),
-                cell(reading.and_then(|r| r.model)),
-                cell(reading.and_then(|r| r.residual))
-            );
-        }
-        csv.push('\n');
-    }
-    csv
-}
-
 /// A value of a parameter with its unit.
 fn quantity(parameter: &FittedParameter, value: f64) -> String {
     with_unit(&parameter.key, &parameter.unit, value)
@@ -266,29 +228,7 @@ fn with_unit(key: &str, unit: &str, value: f64) -> String {
 
 /// The laws that were compared, and what is to be kept in mind.
 fn laws(report: &FitReport) -> String {
-    let mut table = Table::new([
-        ("law", Align::Left),
-        ("AIC", Align::Right),
-        ("BIC", Align::Right),
-        ("above the least", Align::Right),
-        ("weight", Align::Right),
-        ("fits", Align::Left),
-    ]);
-    let known = |value: Option<f64>, digits: usize| {
-        value.map_or_else(String::new, |value| number::significant(value, digits))
-    };
-    let mut text = String::new();
-    for law in &report.laws {
-        table.row([
-            law.law.clone(),
-            known(law.aic, 6),
-            known(law.bic, 6),
-            known(law.above_best, 3),
-            known(law.weight, 3),
-            if law.fits { "yes" } else { "no" }.to_owned(),
-        ]);
-    }
-    text.push_str(&table.render());
+    let mut text = Table::all(&report.law_table()).render();
     text.push('\n');
     for law in report.laws.iter().filter(|law| !law.fits) {
         let reason = law.reason.as_deref().unwrap_or_default();

@@ -2,7 +2,6 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::figure::force_curve::force_curve_figure;
 use nanotap::study::approach::Way;
 use nanotap::study::force_curve::{ForceCurveReport, ForceCurveStudy, StaticJump, Waveform};
 
@@ -30,8 +29,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for warning in &report.warnings {
         output.warning(warning);
     }
-    arguments.study.out.write(|| report.point_table().csv())?;
-    arguments.study.plot.draw(|| force_curve_figure(&report))?;
+    arguments.study.write(&case, &report)?;
     output.study(&case, &report, |report| text(&case, report))
 }
 

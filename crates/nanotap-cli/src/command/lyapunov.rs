@@ -1,7 +1,5 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
-use nanotap::figure::attractors::section_figure;
-use nanotap::observe::time_series;
 use nanotap::study::lyapunov::{ExponentSource, LyapunovReport, LyapunovStudy};
 
 use crate::failure::Failure;
@@ -17,7 +15,7 @@ pub(crate) type Arguments = StudyArguments<LyapunovStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (mut request, case) = arguments.read(output)?;
-    let model = case.model()?;
+    case.model()?;
     let wanted = arguments.out.out.is_some() || arguments.plot.plot.is_some();
     if !wanted {
         request.points = 0;
@@ -26,13 +24,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }
-    arguments.out.write(|| {
-        let names = time_series::state_names(&model);
-        report.section_table(names, case.units()).csv()
-    })?;
-    arguments
-        .plot
-        .draw(|| section_figure(&model, &report, &case.units()))?;
+    arguments.write(&case, &report)?;
     output.notes(&report.notes);
     output.study(&case, &report, |report| text(&case, report))
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
-use nanotap::figure::reconstruct::reconstruct_figure;
 use nanotap::study::reconstruct::{ReconstructMethod, ReconstructReport, ReconstructStudy};
 
 use crate::arguments::measured;
@@ -43,8 +42,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (mut options, case) = arguments.study.read(output)?;
     options.data = measured(&arguments.data, &arguments.also, "reconstruct")?;
     let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
-    arguments.study.out.write(|| report.force_table().csv())?;
-    arguments.study.plot.draw(|| reconstruct_figure(&report))?;
+    arguments.study.write(&case, &report)?;
     for remark in &report.remarks {
         output.warning(remark);
     }

@@ -12,7 +12,7 @@ use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::targets;
 
 /// Sweep one or two parameters, from any number of initial states.
@@ -131,30 +131,7 @@ fn text(
 
 /// Counts the runs by their result, in words.
 fn counts(summary: &Summary) -> String {
-    const SHOWN: usize = 12;
-    let mut table = Table::new([
-        ("motion", Align::Left),
-        ("runs", Align::Right),
-        ("%", Align::Point),
-    ]);
-    let mut row = |name: String, count: usize| {
-        let part = 100.0 * count as f64 / summary.runs.max(1) as f64;
-        table.row([name, count.to_string(), number::significant(part, 3)]);
-    };
-    for (name, count) in &summary.counts {
-        if *count > 0 {
-            row((*name).to_owned(), *count);
-        }
-        if *name == "periodic" {
-            for (period, count) in summary.periods.iter().take(SHOWN) {
-                row(format!("  period {period}"), *count);
-            }
-            if summary.periods.len() > SHOWN {
-                let rest = summary.periods.values().skip(SHOWN).sum();
-                row("  longer".to_owned(), rest);
-            }
-        }
-    }
+    let table = Table::all(&summary.count_table());
     match summary.from_neighbours.len() {
         0 => table.render(),
         more => format!(

@@ -7,7 +7,7 @@ use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::window::figure;
 use nanotap::study::DatasetStudy as _;
-use nanotap::study::window::{Condition, Window, WindowOptions, WindowStudy};
+use nanotap::study::window::{WindowOptions, WindowStudy};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, derived_name};
@@ -16,7 +16,7 @@ use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::targets;
 
 /// The operating window over two parameters: where there is only one motion, and where a second
@@ -73,24 +73,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             let unreached = targets::unreached(&window.unreached, &over);
             format!(
                 "{}{unreached}{}",
-                shares(window),
+                Table::all(&window.share_table()).render(),
                 targets.unwrap_or_default()
             )
         })
     })
-}
-
-/// What part of the points is what.
-fn shares(window: &Window) -> String {
-    let mut table = Table::new([("there is", Align::Left), ("points (%)", Align::Point)]);
-    for condition in Condition::ALL {
-        let Some(&share) = window.shares.get(condition.name()) else {
-            continue;
-        };
-        table.row([
-            condition.words().to_owned(),
-            number::significant(100.0 * share, 3),
-        ]);
-    }
-    table.render()
 }

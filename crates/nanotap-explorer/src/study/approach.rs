@@ -10,6 +10,7 @@ use serde_json::json;
 use super::{Stage, Studied, object, progress};
 use crate::api_error::ApiError;
 use crate::clicks::{self, Axis, Height};
+use crate::report;
 
 /// Numbers of distances in each direction in the stages of an approach curve.
 pub(super) const APPROACH: [usize; 2] = [40, 150];
@@ -28,10 +29,10 @@ impl Studied<'_> {
                     options.insert(end.into(), text.into());
                 }
             }
-            let report = self.report::<ApproachStudy>(&case, &options)?;
+            let found = self.report::<ApproachStudy>(&case, &options)?;
             let units = case.units();
-            let drawn = Approached::of(&case, &report);
-            let near = clicks::of_approach(&report, drawn.factor, &drawn.heights, &units);
+            let drawn = Approached::of(&case, &found);
+            let near = clicks::of_approach(&found, drawn.factor, &drawn.heights, &units);
             self.hand(Stage {
                 clicks: json!({
                     "set": { "x": drawn.axis.json() },
@@ -42,6 +43,7 @@ impl Studied<'_> {
                 figure: Some(drawn.figure),
                 words: progress(points, finest, "distances each way"),
                 studies: &[("approach", &options)],
+                tables: vec![report::of_frame(&found.motion_table(units))],
                 ..Stage::default()
             })
         })

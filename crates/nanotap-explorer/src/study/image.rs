@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Stage, Studied, object};
 use crate::api_error::ApiError;
-use crate::forms;
+use crate::{forms, report};
 
 /// Largest number of heights of a drawn surface.
 const MAX_DRAWN: usize = 1000;
@@ -32,19 +32,20 @@ impl Studied<'_> {
         let mut computed = options.clone();
         let surface = self.surface()?;
         computed.extend(surface.clone().unwrap_or_default());
-        let report = self.report::<ScanStudy>(&case, &computed)?;
-        let gain = report.feedback.as_ref();
+        let scanned = self.report::<ScanStudy>(&case, &computed)?;
+        let gain = scanned.feedback.as_ref();
         let gain = gain.and_then(|feedback| feedback.largest_stable_gain);
         let gain = gain.map_or_else(String::new, |gain| {
             let gain = Kind::Number.format_digits(gain, 3);
             format!(" The feedback is stable up to a gain of {gain}/s.")
         });
         self.hand(Stage {
-            figure: Some(scan_figure(&report)),
+            figure: Some(scan_figure(&scanned)),
             clicks: json!({}),
-            words: format!("{}{gain}", report.verdict),
+            words: format!("{}{gain}", scanned.verdict),
             studies: &[("scan", &options)],
             scan: Self::scan_table(&case, surface),
+            tables: vec![report::of_frame(&scanned.line_table())],
             ..Stage::default()
         })
     }

@@ -1,7 +1,7 @@
 //! Studies of the registry that the page shows by their report alone.
 
+use nanotap::Error;
 use nanotap::case::Case;
-use nanotap::figure::study::{dataset_figure, document_and_figure};
 use nanotap::study::registry::{StudyEntry, study as study_named};
 use nanotap_figures::Figure;
 use serde_json::Value;
@@ -27,19 +27,28 @@ impl Studied<'_> {
         model_of(&case)?;
         let options = self.options(entry);
         let request = Value::Object(options.clone());
-        let (document, figure) = if entry.document.is_some() {
-            self.counting(entry.counted, |control| {
-                document_and_figure(entry, &case, request, control)
-            })?
-        } else {
-            self.whole_dataset(entry, &case, request)?
-        };
         let schema = (entry.report)();
+        let (figure, tables) = if entry.answer.is_some() {
+            let answer = self.counting(entry.counted, |control| {
+                entry.answer(&case, request, control)
+            })?;
+            let document: Value = serde_json::from_str(&answer.document()?).map_err(Error::from)?;
+            let frames = answer.frames();
+            let mut tables = report::tables(&document, schema.as_value());
+            if !frames.is_empty() {
+                tables.truncate(1);
+                tables.extend(frames.iter().filter(|f| f.rows > 0).map(report::of_frame));
+            }
+            (answer.figure(), tables)
+        } else {
+            let (summary, figure) = self.whole_dataset(entry, &case, request)?;
+            (figure, report::tables(&summary, schema.as_value()))
+        };
         self.hand(Stage {
             figure,
             words: entry.about.to_owned(),
             studies: &[(name, &options)],
-            tables: report::tables(&document, schema.as_value()),
+            tables,
             ..Stage::default()
         })
     }
@@ -54,8 +63,9 @@ impl Studied<'_> {
         self.counting(entry.counted, |control| {
             self.dataset(case, entry, request, control, |store| {
                 let summary = entry.summary.map(|of| of(store)).transpose()?;
-                let figure = dataset_figure(entry.name, store).map_err(ApiError::of)?;
-                Ok((summary.unwrap_or_default(), figure))
+                Ok(summary.map_or_else(Default::default, |(summary, figure)| {
+                    (summary, Some(figure))
+                }))
             })
         })
     }

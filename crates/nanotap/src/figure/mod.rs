@@ -16,6 +16,5 @@ pub mod panels;
 pub mod reconstruct;
 pub mod scan;
 pub mod shown;
-pub mod study;
 pub mod sweep;
 pub mod window;

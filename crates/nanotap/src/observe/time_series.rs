@@ -2,6 +2,7 @@
 
 use nanotap_flow::Output;
 
+use crate::case::Case;
 use crate::case::quantity::Kind;
 use crate::case::units::Units;
 use crate::model::{Model, MotionError};
@@ -51,6 +52,12 @@ pub fn scaled<'a>(row: &'a [f64], units: &'a Units) -> impl Iterator<Item = f64>
 /// Names of the entries of a state.
 pub fn state_names(model: &Model) -> Vec<String> {
     model.state_names()
+}
+
+/// The names of the entries of a state of `case`; none if it has no model.
+pub fn entry_names(case: &Case) -> Vec<String> {
+    case.model()
+        .map_or_else(|_| Vec::new(), |model| state_names(&model))
 }
 
 /// Converts a state of a beam to `modes` modes: additional modes are at rest, others are cut off.

@@ -6,6 +6,7 @@ use nanotap_dynamics::{
     ExactOutcome, Fraction, OrbitSearch, PeriodicOrbit, Stability, StartBox, StartOutcome,
     StartSet, census_of, check_starts, find_orbits,
 };
+use nanotap_figures::Figure;
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -14,10 +15,12 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
 use crate::case::units::Units;
-use crate::frame::{Form, Frame, Rows, columns};
+use crate::figure::attractors::attractors_figure;
+use crate::frame::{Form, Frame, Rows, frame};
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
 use crate::number::significant;
+use crate::observe::time_series::entry_names;
 use crate::observe::time_series::state_names;
 use crate::observe::{Dimension, ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
@@ -306,15 +309,14 @@ impl Attractors {
             let states = one.states().iter().enumerate();
             states.map(move |(point, state)| (k, one, point, state))
         });
-        let rows = columns! { Rows::new("states", states, Some(units));
+        frame! { Rows::new("states", states, Some(units));
             "attractor", "", Plain => |(k, ..)| k + 1;
             "classification", "", Plain => |(_, one, ..)| one.classification.name();
             "period", "", Plain => |(_, one, ..)| Some(one.orbit.as_ref()?.period);
             "fraction", "", Digits(5) => |(_, one, ..)| one.share.fraction;
             "point", "", Plain => |(_, _, point, _)| point;
             .states(names, |(.., state)| state);
-        };
-        rows.frame()
+        }
     }
 
     /// The attractors with their shares of the initial states.
@@ -330,7 +332,7 @@ impl Attractors {
                 .map(|end| significant(100.0 * end, 3));
             format!("{low} … {high}")
         };
-        let rows = columns! { Rows::new("attractors", self.attractors.iter().enumerate(), Some(units));
+        frame! { Rows::new("attractors", self.attractors.iter().enumerate(), Some(units));
             "attractor", "", Plain => |(k, _)| k + 1;
             "motion", "motion", Plain => move |(_, a)| motion(a);
             "fraction", "starts", Percent(3) => |(_, a)| a.share.fraction;
@@ -341,8 +343,7 @@ impl Attractors {
                 |(_, a)| Some(a.observables()?.contact_fraction);
             "contacts_per_period", "contacts/period", Digits(3) =>
                 |(_, a)| Some(a.observables()?.contacts_per_period);
-        };
-        rows.frame()
+        }
     }
 
     /// The unstable orbits.
@@ -353,14 +354,13 @@ impl Attractors {
             let moduli = o.multipliers.iter().map(modulus);
             moduli.filter(|m| *m > 1.0).count()
         };
-        let rows = columns! { Rows::new("unstable", orbits, Some(units));
+        frame! { Rows::new("unstable", orbits, Some(units));
             "period", "period", Plain => |o| o.period;
             "spectral_radius", "|μ|", Digits(6) => |o| spectral_radius(&o.multipliers);
             "directions", "unstable directions", Plain => directions;
             "tip", "tip", Plain => move |o| tip_range(&o.observables, units, 4);
             "contact_fraction", "contact", Percent(4) => |o| o.observables.contact_fraction;
-        };
-        rows.frame()
+        }
     }
 
     /// Proves the reported orbits by interval arithmetic where possible.
@@ -883,6 +883,23 @@ impl Study for AttractorsStudy {
     const PARTIAL: bool = true;
     type Options = AttractorsOptions;
     type Report = Attractors;
+
+    fn frames<'a>(case: &Case, report: &'a Attractors) -> Vec<Frame<'a>> {
+        let (names, units) = (entry_names(case), case.units());
+        vec![
+            report.state_table(names, units),
+            report.attractor_table(units),
+            report.unstable_table(units),
+        ]
+    }
+
+    fn figure(case: &Case, report: &Attractors) -> Option<Figure> {
+        Some(attractors_figure(
+            &case.model().ok()?,
+            report,
+            &case.units(),
+        ))
+    }
 
     fn compute(
         case: &Case,

@@ -28,6 +28,7 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
+use crate::frame::{Frame, Rows, frame};
 use crate::model::Model;
 use crate::model::model_map::{ModelMap, together};
 use crate::observe::time_series::state_names;
@@ -37,6 +38,7 @@ use crate::study::request::options;
 use crate::study::simulate::{Classification, starting_state};
 use crate::study::start_box::before_wall;
 use crate::study::{Computation, DatasetPlan, DatasetStudy};
+use nanotap_figures::Figure;
 
 /// Most points along an axis, and of a slice.
 const MOST: usize = 1_000_000;
@@ -581,6 +583,30 @@ pub struct Shares {
     pub behind: f64,
 }
 
+impl Shares {
+    /// Which part of the slice goes where.
+    pub fn share_table(&self) -> Frame<'_> {
+        let attractors = self.attractors.iter().enumerate();
+        let attractors = attractors.map(|(k, one)| match one.period {
+            Some(period) => (Some(k + 1), format!("period {period}"), one.fraction),
+            None => (Some(k + 1), one.classification.clone(), one.fraction),
+        });
+        let others = [
+            ("none within the periods", self.unsettled),
+            ("left every bound", self.unbounded),
+            ("could not be followed", self.failed),
+            ("behind the surface", self.behind),
+        ];
+        let others = others.into_iter().filter(|(_, part)| *part > 0.0);
+        let others = others.map(|(name, part)| (None, name.to_owned(), part));
+        frame! { Rows::new("shares", attractors.chain(others), None);
+            "number", "", Plain => |(number, ..)| number;
+            "attractor", "attractor", Plain => |(_, name, _)| name;
+            "fraction", "starts", Percent(4) => |(.., part)| part;
+        }
+    }
+}
+
 /// An attractor and its fraction of a slice.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AttractorShare {
@@ -795,5 +821,9 @@ impl DatasetStudy for BasinStudy {
 
     fn report(store: &Store) -> Result<Shares, StoreError> {
         shares(store)
+    }
+
+    fn figure(store: &Store) -> Result<Figure, StoreError> {
+        crate::figure::basin::figure(store)
     }
 }

@@ -8,15 +8,19 @@ use nanotap_dynamics::{
     Direction, LyapunovOptions, PeriodicOrbit, ShootingOptions, StartSet, assemble_diagram,
     continue_attractors, continue_orbit, trace_curve,
 };
+use nanotap_figures::Figure;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::case::state::WrittenState;
 use crate::case::{Case, Held, Key, ParameterUnit, PlaneFamily};
+use crate::figure::branch::case_figure;
+use crate::frame::Frame;
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
+use crate::observe::time_series::entry_names;
 use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
 use crate::study::event::{Event, EventReport, Window, along};
@@ -1177,6 +1181,24 @@ impl Study for BranchStudy {
     const PARTIAL: bool = true;
     type Options = BranchOptions;
     type Report = BranchReport;
+
+    fn frames<'a>(case: &Case, report: &'a BranchReport) -> Vec<Frame<'a>> {
+        let (names, units) = (entry_names(case), case.units());
+        let second = report.loci.as_ref();
+        let second = second.and_then(|loci| case.parameter_unit(loci.key));
+        vec![
+            report.point_table(names, units),
+            report.branch_table(units),
+            report.bifurcation_table(units),
+            report.event_table(units),
+            report.attractor_table(units),
+            report.curve_table(second, units),
+        ]
+    }
+
+    fn figure(case: &Case, report: &BranchReport) -> Option<Figure> {
+        Some(case_figure(case, report, None))
+    }
 
     fn compute(
         case: &Case,

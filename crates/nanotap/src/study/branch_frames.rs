@@ -3,7 +3,7 @@
 use crate::case::ParameterUnit;
 use crate::case::physical::Kind;
 use crate::case::units::Units;
-use crate::frame::{Align, Form, Frame, Rows, columns};
+use crate::frame::{Form, Frame, Rows, frame};
 use crate::number::significant;
 use crate::observe::{Dimension, Observables};
 use crate::study::attractors::tip_range;
@@ -74,7 +74,8 @@ impl BranchReport {
             kind if self.key.is_physical() && kind != Kind::Number => Dimension::Si(kind),
             _ => Dimension::Number,
         };
-        let rows = columns! { Rows::new("points", orbits, Some(units));
+        let is_si = matches!(units, Units::Si(_));
+        frame! { Rows::new("points", orbits, Some(units));
             "branch", "", Plain => |o| o.branch;
             "kind", "", Plain => |o| o.kind;
             "period", "", Plain => |o| o.period;
@@ -84,9 +85,8 @@ impl BranchReport {
             .observed(self.observed, |o| Some(o.observables));
             "A_ratio", "", Digits(5) => |o| o.amplitude_ratio;
             .states(names, |o| o.state);
-        };
-        let is_si = matches!(units, Units::Si(_));
-        rows.frame().without(if is_si { &[] } else { &["A_ratio"] })
+            .without(if is_si { &[] } else { &["A_ratio"] });
+        }
     }
 
     /// The branches.
@@ -98,17 +98,16 @@ impl BranchReport {
                 .count()
         };
         let reaches = move |b: &'_ BranchSummary| range(self.parameter_unit, units, b.range);
-        let rows = columns! { Rows::new("branches", self.branches.iter().enumerate(), Some(units));
+        frame! { Rows::new("branches", self.branches.iter().enumerate(), Some(units));
             "branch", "branch", Plain => |(k, _)| k + 1;
             "period", "period", Plain => |(_, b)| b.period;
             "parent", "from", Plain => |(_, b)| b.parent.map(|p| format!("branch {}", p + 1));
-            .align(Align::Right);
+            .align(Right);
             "points", "points", Plain => |(_, b)| b.points;
             "stable", "stable", Plain => move |(k, _)| stable(k);
             "range", "reaches", Plain => move |(_, b)| reaches(b);
             "end", "ends at", Plain => |(_, b)| &b.end;
-        };
-        rows.frame()
+        }
     }
 
     /// The bifurcations.
@@ -119,31 +118,29 @@ impl BranchReport {
             let words = b.criticality.map(str::to_owned).into_iter().chain(pair);
             words.collect::<Vec<_>>().join(", ")
         };
-        let rows = columns! { Rows::new("bifurcations", &self.bifurcations, Some(units));
+        frame! { Rows::new("bifurcations", &self.bifurcations, Some(units));
             "branch", "branch", Plain => |b| b.branch + 1;
             "kind", "", Plain => |b| b.kind;
             "parameter", self.parameter, shown => move |b| si * b.parameter;
-            .align(Align::Left);
+            .align(Left);
             "period", "period", Plain => |b| b.period;
             "tip", "tip", Plain => move |b| tip_range(&b.observables, units, 5);
             "contact_fraction", "contact", Percent(4) => |b| b.observables.contact_fraction;
             "remarks", "", Plain => remarks;
-        };
-        rows.frame()
+        }
     }
 
     /// The orbits at which the requested events happen.
     pub fn event_table(&self, units: Units) -> Frame<'_> {
         let (shown, si) = parameter(self.parameter_unit, 10);
-        let rows = columns! { Rows::new("events", &self.events, Some(units));
+        frame! { Rows::new("events", &self.events, Some(units));
             "branch", "branch", Plain => |e| e.point.branch + 1;
             "event", "", Plain => |e| &e.event;
             "parameter", self.parameter, shown => move |e| si * e.point.parameter;
-            .align(Align::Left);
+            .align(Left);
             "period", "period", Plain => |e| e.point.period;
             "stable", "", Plain => |e| if e.point.stable { "stable" } else { "unstable" };
-        };
-        rows.frame()
+        }
     }
 
     /// The curves in two parameters; `second` is the unit of the second one.
@@ -156,15 +153,14 @@ impl BranchReport {
         let name = self.loci.as_ref().map_or("", |loci| loci.second);
         let curves = self.loci.iter().flat_map(|loci| &loci.curves);
         let first = move |c: &'_ CurveReport| range(self.parameter_unit, units, ends(&c.first));
-        let rows = columns! { Rows::new("curves", curves, Some(units));
+        frame! { Rows::new("curves", curves, Some(units));
             "kind", "", Plain => |c| c.event.as_deref().unwrap_or(c.kind);
             "period", "period", Plain => |c| c.period;
             "points", "points", Plain => |c| c.first.len();
             "first", self.parameter, Plain => first;
             "second", name, Plain => move |c| range(second, units, ends(&c.second));
             "ends", "ends at", Plain => |c| c.ends.join("; ");
-        };
-        rows.frame()
+        }
     }
 
     /// The attractors of the census: where each exists, with its least and greatest share. Motions
@@ -205,14 +201,13 @@ impl BranchReport {
                 one.classification.to_owned()
             }
         };
-        let rows = columns! { Rows::new("attractors", rows, Some(units));
+        frame! { Rows::new("attractors", rows, Some(units));
             "attractor", "", Plain => |(number, ..)| number.map(|number| number + 1);
             "motion", "motion", Plain => move |(_, first, ..)| motion(first);
             "parameter", self.parameter, Plain =>
                 move |(_, first, last, _, are_two)| joined(at(first.parameter), at(last), are_two);
             "share", "share (%)", Plain =>
                 move |(.., [low, high], _)| joined(percent(low), percent(high), low < high);
-        };
-        rows.frame()
+        }
     }
 }

@@ -9,6 +9,7 @@
 use nanotap_dynamics::{
     ClassifyOptions, ContinuationOptions, Control, ShootingOptions, classify, close_orbit,
 };
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -17,7 +18,8 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::Key;
 use crate::case::units::Units;
-use crate::frame::{Align, Frame, Rows, columns};
+use crate::figure::contact_laws::sample_figure;
+use crate::frame::{Frame, Rows, frame};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
@@ -102,12 +104,11 @@ impl Comparison {
             let points = sample.orbit.iter().flat_map(|orbit| &orbit.force_loop);
             points.map(move |point| (&*sample.contact, point))
         });
-        let rows = columns! { Rows::new("loops", points, Some(units));
+        frame! { Rows::new("loops", points, Some(units));
             "contact", "contact", Plain => |(contact, _)| contact;
             "indentation", "indentation", (Length, Digits(5)) => |(_, [indentation, _])| indentation;
             "force", "force", (Force, Digits(5)) => |(_, [_, force])| force;
-        };
-        rows.frame()
+        }
     }
 
     /// The orbit on each sample.
@@ -124,7 +125,7 @@ impl Comparison {
             Some(if is_zero { 0.0 } else { o.least_force })
         };
         let radius = |s: &'_ SampleMotion| Some(s.orbit.as_ref()?.spectral_radius);
-        let rows = columns! { Rows::new("samples", &self.samples, Some(units));
+        frame! { Rows::new("samples", &self.samples, Some(units));
             "contact", "sample", Plain => |s| &s.contact;
             "from_rest", "from rest", Plain => from_rest;
             "spectral_radius", "largest |μ|", Digits(5) => radius;
@@ -135,8 +136,8 @@ impl Comparison {
             "indentation", "indentation", (Length, Quantity([5, 5])) =>
                 move |s| Some(seen(s)?.indentation);
             "contact_fraction", "contact", Percent(5) => move |s| Some(seen(s)?.contact_fraction);
-        };
-        rows.frame().aligned(Align::Point, Align::Point)
+            .aligned(Point, Point);
+        }
     }
 }
 
@@ -408,6 +409,15 @@ impl Study for ContactLawsStudy {
     const ABOUT: &'static str = "Compare contact laws under the same lever and drive";
     type Options = ContactLawsOptions;
     type Report = Comparison;
+
+    fn frames<'a>(case: &Case, report: &'a Comparison) -> Vec<Frame<'a>> {
+        let units = case.units();
+        vec![report.loop_table(units), report.sample_table(units)]
+    }
+
+    fn figure(case: &Case, report: &Comparison) -> Option<Figure> {
+        Some(sample_figure(report, &case.units()))
+    }
 
     fn compute(
         case: &Case,

@@ -1,6 +1,7 @@
 //! Convergence of a motion with the number of modes N = 1 … K.
 
 use nanotap_dynamics::Control;
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -8,7 +9,8 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind;
 use crate::case::units::{NumbersInSi, Units};
-use crate::frame::{Align, Frame, Rows, columns};
+use crate::figure::motion::convergence_figure;
+use crate::frame::{Frame, Rows, frame};
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
@@ -88,7 +90,7 @@ impl Convergence {
             (None, None) => m.classification.name().to_owned(),
         };
         let rows = self.motions.iter().zip(&self.difference);
-        let rows = columns! { Rows::new("motions", rows, Some(units));
+        frame! { Rows::new("motions", rows, Some(units));
             "modes", "modes", Plain => |(m, _)| m.modes;
             "difference", "", Plain => |(_, difference)| difference;
             .only_in_files();
@@ -100,22 +102,21 @@ impl Convergence {
             "tip_min", "W min", (Length, Quantity([6, 5])) => |(m, _)| m.tip_min;
             "contact_fraction", "contact", Percent(4) => |(m, _)| m.contact_fraction;
             "spectral_radius", "largest |μ|", Digits(6) => |(m, _)| m.spectral_radius;
-        };
-        rows.frame().aligned(Align::Point, Align::Point)
+            .aligned(Point, Point);
+        }
     }
 
     /// What an experimenter reads with each number of modes, and the share of each mode.
     pub fn reading_table(&self, units: Units) -> Frame<'_> {
         let report = &self.readings;
         let share = |k: usize| report.mode_shares.get(k);
-        let rows = columns! { Rows::new("readings", 0..report.readings.len(), Some(units));
+        frame! { Rows::new("readings", 0..report.readings.len(), Some(units));
             "modes", "modes", Plain => |k| k + 1;
             .fields(|k: usize| report.readings[k].as_ref());
             "energy_share", "share of the mode: energy", Percent(3) => move |k| Some(share(k)?.energy);
             "tip_share", "tip", Percent(3) => move |k| Some(share(k)?.tip);
             "force_share", "force", Percent(3) => move |k| share(k)?.force;
-        };
-        rows.frame()
+        }
     }
 }
 
@@ -324,6 +325,15 @@ impl Study for ConvergenceStudy {
     const ABOUT: &'static str = "Compare the motion with 1 to K modes: how many are enough";
     type Options = ConvergenceOptions;
     type Report = Convergence;
+
+    fn frames<'a>(case: &Case, report: &'a Convergence) -> Vec<Frame<'a>> {
+        let units = case.units();
+        vec![report.motion_table(units), report.reading_table(units)]
+    }
+
+    fn figure(case: &Case, report: &Convergence) -> Option<Figure> {
+        Some(convergence_figure(report, &case.units()))
+    }
 
     fn compute(
         case: &Case,

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::{Case, Key};
-use crate::frame::{Align, Form, Frame, Rows, columns, finite};
+use crate::frame::{Form, Frame, Rows, finite, frame};
 use crate::observe::{Dimension, Observable, ObservableSet, Observables, PhysicalMotion};
 use crate::study::Study;
 use crate::study::request::options;
@@ -178,7 +178,12 @@ impl LeverReport {
             None if row.k.is_finite() => "not reached",
             None => "",
         };
-        let rows = columns! { Rows::new("levers", &self.levers, None);
+        let unconditional: &[&str] = if self.conditions.is_empty() {
+            &["holds"]
+        } else {
+            &[]
+        };
+        frame! { Rows::new("levers", &self.levers, None);
             "lever", "lever", Plain => |row| &row.lever;
             "holds", "fits", Plain => holds;
             "k", "k", four(Kind::Stiffness) => |row| finite(row.k);
@@ -193,14 +198,9 @@ impl LeverReport {
             "A", "A", four(Kind::Length) => move |row| finite(motion(row)?.first_harmonic);
             "phase", "phase", (Angle, Digits(4)) => move |row| Some(motion(row)?.phase);
             "time_constant", "τ", four(Kind::Time) => |row| finite(row.time_constant);
-        };
-        let unconditional = if self.conditions.is_empty() {
-            &["holds"][..]
-        } else {
-            &[]
-        };
-        let frame = rows.frame().without(unconditional);
-        frame.aligned(Align::Point, Align::Point)
+            .without(unconditional);
+            .aligned(Point, Point);
+        }
     }
 }
 
@@ -215,6 +215,10 @@ impl Study for LeverStudy {
     const ANY_DISTANCE: bool = true;
     type Options = LeverOptions;
     type Report = LeverReport;
+
+    fn frames<'a>(_: &Case, report: &'a LeverReport) -> Vec<Frame<'a>> {
+        vec![report.lever_table()]
+    }
 
     fn compute(
         case: &Case,

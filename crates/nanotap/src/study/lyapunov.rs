@@ -4,6 +4,7 @@ use nanotap_dynamics::{
     ClassifyOptions, LyapunovSpectrum, PeriodicOrbit, StroboscopicMap as _, classify,
     lyapunov_spectrum,
 };
+use nanotap_figures::Figure;
 use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,10 +16,12 @@ use crate::case::Case;
 use crate::case::state::WrittenState;
 use crate::case::units::Units;
 use crate::control::Control;
-use crate::frame::{Frame, Rows, columns};
+use crate::figure::attractors::section_figure;
+use crate::frame::{Frame, Rows, frame};
 use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
+use crate::observe::time_series::entry_names;
 use crate::study::Study;
 use crate::study::attractors::orbit_exponents;
 use crate::study::initial_state::initial_state_note;
@@ -335,25 +338,23 @@ pub enum SectionKind {
 impl LyapunovReport {
     /// The section, with the names of the entries of a state.
     pub fn section_table(&self, names: Vec<String>, units: Units) -> Frame<'_> {
-        let rows = columns! { Rows::new("section", &self.section, Some(units));
+        frame! { Rows::new("section", &self.section, Some(units));
             "phase_degrees", "", Digits(5) => |p| 360.0 * p.phase;
             "tip", "", (Length, Digits(5)) => |p| p.tip;
             "tip_rate", "", (Velocity, Digits(5)) => |p| p.tip_rate;
             "gap_rate", "", (Velocity, Digits(5)) => |p| p.gap_rate;
             .states(names, |p| &p.state);
-        };
-        rows.frame()
+        }
     }
 
     /// The exponents, largest first.
     pub fn exponent_table(&self) -> Frame<'_> {
         let rows = self.exponents.iter().zip(&self.errors).enumerate();
-        let rows = columns! { Rows::new("exponents", rows, None);
+        frame! { Rows::new("exponents", rows, None);
             "number", "", Plain => |(k, _)| k + 1;
             "exponent", "exponent per drive period", Digits(5) => |(_, (exponent, _))| exponent;
             "error", "± standard error", Digits(2) => |(_, (_, error))| error;
-        };
-        rows.frame()
+        }
     }
 }
 
@@ -404,6 +405,18 @@ impl Study for LyapunovStudy {
         "Compute the Lyapunov spectrum with error bars, and a Poincaré section";
     type Options = LyapunovOptions;
     type Report = LyapunovReport;
+
+    fn frames<'a>(case: &Case, report: &'a LyapunovReport) -> Vec<Frame<'a>> {
+        let names = entry_names(case);
+        vec![
+            report.section_table(names, case.units()),
+            report.exponent_table(),
+        ]
+    }
+
+    fn figure(case: &Case, report: &LyapunovReport) -> Option<Figure> {
+        Some(section_figure(&case.model().ok()?, report, &case.units()))
+    }
 
     fn compute(
         case: &Case,

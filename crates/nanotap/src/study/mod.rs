@@ -45,6 +45,7 @@ pub mod window;
 use std::fmt::Debug;
 
 use nanotap_dynamics::Control;
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -56,6 +57,7 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
+use crate::frame::Frame;
 use crate::model::cantilever::Cantilever;
 use crate::model::sample_law::SampleLaw;
 use registry::StudyEntry;
@@ -93,7 +95,7 @@ pub trait Study {
     /// Options: what front ends show, check and pass on as JSON.
     type Options: Serialize + DeserializeOwned + JsonSchema;
     /// Report, which front ends print and write as JSON.
-    type Report: Serialize + JsonSchema + 'static;
+    type Report: Serialize + JsonSchema + Send + 'static;
 
     /// Noun for what the progress counts, in the plural.
     const COUNTED: &'static str = "steps";
@@ -106,6 +108,16 @@ pub trait Study {
     const ANY_RATIO: bool = false;
     /// Whether the report of cancelled work holds the finished part, and states that it is a part.
     const PARTIAL: bool = false;
+
+    /// The tables of a report on `case`, as front ends show them; files contain the first.
+    fn frames<'a>(_case: &Case, _report: &'a Self::Report) -> Vec<Frame<'a>> {
+        Vec::new()
+    }
+
+    /// The figure of a report on `case`, if it has one.
+    fn figure(_case: &Case, _report: &Self::Report) -> Option<Figure> {
+        None
+    }
 
     /// Computes the report of a `case` that `control` cancels: implements [`run`](Self::run).
     ///
@@ -190,6 +202,12 @@ pub trait DatasetStudy {
     /// # Errors
     /// When a chunk is missing or damaged.
     fn report(store: &Store) -> Result<Self::Report, StoreError>;
+
+    /// The figure of a finished dataset.
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged.
+    fn figure(store: &Store) -> Result<Figure, StoreError>;
 }
 
 /// The checked computation of a dataset: its chunks are pure functions of it.

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Complex;
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -12,7 +13,8 @@ use crate::case::Case;
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::control::Control;
-use crate::frame::{Align, Form, Frame, Rows, columns};
+use crate::figure::modes::shapes_figure;
+use crate::frame::{Form, Frame, Rows, frame};
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
@@ -156,19 +158,19 @@ impl ModeTable {
         let paired = paired.filter(|list| list.len() == galerkin.len());
         let damped = move |k: usize| Some(paired?[k]);
         let difference = |k: usize| Some(percent(galerkin[k] / exact.get(k)? - 1.0));
-        let rows = columns! { Rows::new("frequencies", 0..galerkin.len(), Some(units));
+        frame! { Rows::new("frequencies", 0..galerkin.len(), Some(units));
             "mode", "mode", Plain => |k| k + 1;
             "galerkin", format!("{symbol} Galerkin"), (Frequency, Quantity([7, 7])) =>
                 |k| galerkin[k];
             "exact", format!("{symbol} exact"), (Frequency, Quantity([7, 7])) =>
                 |k| exact.get(k).copied();
             "difference", "difference", Plain => difference;
-            .align(Align::Point);
+            .align(Point);
             "damped", format!("{symbol} damped"), (Frequency, Quantity([7, 7])) =>
                 move |k| Some(damped(k)?[1]);
             "damping", "damping ζ", Digits(4) => move |k| damped(k).map(damping_ratio);
-        };
-        rows.frame().aligned(Align::Point, Align::Point)
+            .aligned(Point, Point);
+        }
     }
 }
 
@@ -207,6 +209,16 @@ impl Study for ModesStudy {
     // The frequencies do not depend on it.
     const ANY_DISTANCE: bool = true;
     const WITHOUT_DISTANCE: bool = true;
+
+    fn frames<'a>(case: &Case, report: &'a ModeTable) -> Vec<Frame<'a>> {
+        let tables =
+            [false, true].map(|in_contact| report.frequency_table(in_contact, case.units()));
+        tables.into()
+    }
+
+    fn figure(_: &Case, report: &ModeTable) -> Option<Figure> {
+        Some(shapes_figure(&Modes::new(report.modes).ok()?))
+    }
 
     fn compute(case: &Case, _: &ModesOptions, _: &Control<'_>) -> Result<ModeTable, Error> {
         let mut table = ModeTable::new(cantilever(case, Self::NAME)?)?;

@@ -9,6 +9,7 @@ use nanotap_dynamics::{
     ShootingOptions, Stability, StroboscopicMap as _, check_size, classify, close_orbit,
     close_orbit_from_points, find_orbits,
 };
+use nanotap_figures::Figure;
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -17,7 +18,8 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::state::WrittenState;
 use crate::case::units::Units;
-use crate::frame::{Frame, Rows, columns};
+use crate::figure::motion::orbit_figure;
+use crate::frame::{Frame, Rows, frame};
 use crate::model::model_map::ModelMap;
 use crate::model::recording::{NonlinearRecording, Recording};
 use crate::model::{MemoryReset, Model};
@@ -104,7 +106,7 @@ pub fn harmonic_table(spectrum: &Spectrum, omega: f64, units: Units) -> Frame<'_
     if spectrum.harmonics.iter().all(|h| h.slope.is_none()) {
         unknown.push("slope");
     }
-    let rows = columns! { Rows::new("harmonics", &spectrum.harmonics, Some(units));
+    frame! { Rows::new("harmonics", &spectrum.harmonics, Some(units));
         "order", "order", Digits(5) => |h| h.order;
         "frequency", "frequency", (Frequency, Digits(5)) => move |h| h.order * omega;
         "tip", "tip", (Length, Digits(5)) => |h| h.tip;
@@ -112,8 +114,8 @@ pub fn harmonic_table(spectrum: &Spectrum, omega: f64, units: Units) -> Frame<'_
         "force", "force", (Force, Digits(5)) => |h| h.force;
         "force_lag_degrees", "lag", Digits(5) => |h| h.force_phase;
         "slope", "slope", Digits(5) => |h| h.slope;
-    };
-    rows.frame().without(&unknown)
+        .without(&unknown);
+    }
 }
 
 impl OrbitReport {
@@ -614,6 +616,19 @@ impl Study for OrbitStudy {
     const ABOUT: &'static str = "Compute a periodic orbit by Newton's method, stable or not";
     type Options = OrbitOptions;
     type Report = InSi<OrbitReport>;
+
+    fn frames<'a>(case: &Case, report: &'a InSi<OrbitReport>) -> Vec<Frame<'a>> {
+        let spectrum = &report.motion.spectrum;
+        vec![harmonic_table(spectrum, case.omega(), case.units())]
+    }
+
+    fn figure(case: &Case, report: &InSi<OrbitReport>) -> Option<Figure> {
+        Some(orbit_figure(
+            &case.model().ok()?,
+            &report.motion,
+            &case.units(),
+        ))
+    }
 
     fn compute(
         case: &Case,

@@ -31,16 +31,18 @@
 //! ```
 //!
 //! A sweep, a window and basins leave a dataset, and so does a scan of independent lines: [`StudyEntry::plan`] gives what computes it
-//! chunk by chunk. A figure is drawn from the report itself, by the study's function in
-//! [`figure`](crate::figure).
+//! chunk by chunk. [`StudyEntry::answer`] gives the
+//! report itself, with its document, its tables and its figure.
 
 use nanotap_dynamics::Control;
+use nanotap_figures::Figure;
 use schemars::Schema;
 use serde_json::Value;
 
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::Store;
+use crate::frame::Frame;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
 pub use crate::study::{DatasetPlan, DatasetStudy};
@@ -63,22 +65,57 @@ pub struct StudyEntry {
     pub partial: bool,
     /// Whether it chooses the distance itself, so that none is solved for a setpoint.
     pub any_distance: bool,
-    /// Runs it to the JSON of its document, if it leaves one.
-    pub document: Option<Run<String>>,
+    /// Runs it to its report, if that is a document.
+    pub answer: Option<Run<Box<dyn Answer>>>,
     /// Plans what is to be computed into a dataset, if it leaves one.
     pub dataset: Option<Run<DatasetPlan>>,
-    /// The JSON of the summary of its finished dataset, if it leaves one.
+    /// The JSON of the summary of its finished dataset, if it leaves one, and its figure.
     pub summary: Option<Summarise>,
 }
 
-/// What summarises a finished dataset, as JSON.
-pub type Summarise = fn(&Store) -> Result<Value, Error>;
+/// What summarises a finished dataset, as JSON, and draws it.
+pub type Summarise = fn(&Store) -> Result<(Value, Figure), Error>;
 
 /// What runs a study on a case, from the JSON of its request.
 pub type Run<R> = fn(&Case, Value, &Control<'_>) -> Result<R, Error>;
 
+/// The report of a study on a case.
+pub trait Answer: Send {
+    /// The JSON of the document.
+    ///
+    /// # Errors
+    /// When a field cannot be written.
+    fn document(&self) -> Result<String, Error>;
+
+    /// The tables, as front ends show them; files contain the first.
+    fn frames(&self) -> Vec<Frame<'_>>;
+
+    /// The figure, if the study has one.
+    fn figure(&self) -> Option<Figure>;
+}
+
+struct Answered<S: Study> {
+    case: Case,
+    report: S::Report,
+}
+
+impl<S: Study> Answer for Answered<S> {
+    fn document(&self) -> Result<String, Error> {
+        let document = Document::of::<S>(&self.report, &self.case);
+        Ok(serde_json::to_string(&document)?)
+    }
+
+    fn frames(&self) -> Vec<Frame<'_>> {
+        S::frames(&self.case, &self.report)
+    }
+
+    fn figure(&self) -> Option<Figure> {
+        S::figure(&self.case, &self.report)
+    }
+}
+
 impl StudyEntry {
-    pub(super) const fn of<S: Study>() -> Self {
+    pub(super) const fn of<S: Study + 'static>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -87,7 +124,7 @@ impl StudyEntry {
             counted: S::COUNTED,
             partial: S::PARTIAL,
             any_distance: S::ANY_DISTANCE,
-            document: Some(|case, request, control| {
+            answer: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
                 let case = if S::ANY_DISTANCE {
                     case.clone()
@@ -95,7 +132,7 @@ impl StudyEntry {
                     at_setpoint(case.clone(), control)?.0
                 };
                 let report = S::run(&case, &request, control)?;
-                Ok(serde_json::to_string(&Document::of::<S>(&report, &case))?)
+                Ok(Box::new(Answered::<S> { case, report }))
             }),
             dataset: None,
             summary: None,
@@ -123,7 +160,7 @@ impl StudyEntry {
             counted: S::COUNTED,
             partial: true,
             any_distance: false,
-            document: None,
+            answer: None,
             dataset: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
                 let case = if S::solves_distance(&request) {
@@ -133,27 +170,43 @@ impl StudyEntry {
                 };
                 S::plan(&case, &request, control)
             }),
-            summary: Some(|store| Ok(serde_json::to_value(S::report(store)?)?)),
+            summary: Some(|store| {
+                let summary = serde_json::to_value(S::report(store)?)?;
+                Ok((summary, S::figure(store)?))
+            }),
         }
     }
 
-    /// The JSON of its document.
+    /// Its report on a case.
     ///
     /// # Errors
     /// Those of the study; and when its report is a dataset.
-    pub fn document(
+    pub fn answer(
         &self,
         case: &Case,
         request: Value,
         control: &Control<'_>,
-    ) -> Result<String, Error> {
-        let run = self.document.ok_or_else(|| {
+    ) -> Result<Box<dyn Answer>, Error> {
+        let run = self.answer.ok_or_else(|| {
             Error::input(
                 format!("{} leaves a dataset, not a document", self.name),
                 "compute its plan into a folder",
             )
         })?;
         run(case, request, control)
+    }
+
+    /// The JSON of its document.
+    ///
+    /// # Errors
+    /// Those of [`answer`](Self::answer).
+    pub fn document(
+        &self,
+        case: &Case,
+        request: Value,
+        control: &Control<'_>,
+    ) -> Result<String, Error> {
+        self.answer(case, request, control)?.document()
     }
 
     /// What is to be computed into a dataset.

@@ -18,6 +18,7 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
+use crate::frame::{Frame, Rows, frame};
 use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
@@ -29,6 +30,7 @@ use crate::study::sweep::{
 use crate::study::target::{TargetReport, Targets};
 use crate::study::value::Axes;
 use crate::study::{DatasetPlan, DatasetStudy};
+use nanotap_figures::Figure;
 
 /// Condition of the lever at one point, from the safest to the least safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -134,6 +136,18 @@ pub struct Window {
     /// Where the conditions of `where` hold.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub targets: Option<TargetReport>,
+}
+
+impl Window {
+    /// Which part of the points has each condition.
+    pub fn share_table(&self) -> Frame<'_> {
+        let share = |condition: Condition| Some((condition, *self.shares.get(condition.name())?));
+        let shares = Condition::ALL.into_iter().filter_map(share);
+        frame! { Rows::new("shares", shares, None);
+            "condition", "there is", Plain => |(condition, _)| condition.words();
+            "share", "points", Percent(3) => |(_, share)| share;
+        }
+    }
 }
 
 /// One motion found from one start.
@@ -399,6 +413,10 @@ impl DatasetStudy for WindowStudy {
 
     fn report(store: &Store) -> Result<Window, StoreError> {
         Window::kept(store)
+    }
+
+    fn figure(store: &Store) -> Result<Figure, StoreError> {
+        crate::figure::window::figure(store)
     }
 }
 

@@ -25,7 +25,7 @@ fn run(study: &StudyEntry, case: &Case, request: Value) -> Result<(), String> {
         cancel: Some(&stop),
         progress: None,
     };
-    match (study.document, study.dataset) {
+    match (study.answer, study.dataset) {
         (Some(run), _) => run(case, request, &control).map(drop),
         (None, Some(plan)) => plan(case, request, &control).map(drop),
         (None, None) => Ok(()),

@@ -44,7 +44,7 @@ fn run(at: usize, request: Value) -> Result<(), Error> {
     if let Some(plan) = study.dataset {
         plan(&case, request.clone(), &control).map(drop)?;
     }
-    let run = study.document;
+    let run = study.answer;
     run.map_or(Ok(()), |run| run(&case, request, &control).map(drop))
 }
 

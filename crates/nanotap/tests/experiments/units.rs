@@ -83,17 +83,31 @@ fn without_si(value: &Value, path: &str, found: &mut Vec<String>) {
 fn every_motion_of_every_study_is_told_in_si() {
     let case = lever();
     for study in STUDIES {
-        let (Some(run), Some(request)) = (study.document, request(study.name)) else {
+        let (Some(run), Some(request)) = (study.answer, request(study.name)) else {
             continue;
         };
         let answer = match run(&case, request, &Control::default()) {
-            Ok(text) => text,
+            Ok(answer) => answer,
             // A scan needs its table in the case.
             Err(error) if error.to_string().contains("[scan]") => continue,
             Err(error) => panic!("{}: {error}", study.name),
         };
         let mut found = Vec::new();
-        let answer: Value = serde_json::from_str(&answer).unwrap();
+        for frame in answer.frames() {
+            let csv = frame.csv();
+            let widths: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+            assert_eq!(
+                widths.len(),
+                frame.rows + 1,
+                "{} {}",
+                study.name,
+                frame.name
+            );
+            assert!(widths.iter().all(|width| *width == widths[0]), "{csv}");
+            let shown = frame.shown_columns();
+            assert!(!shown.is_empty(), "{} {}", study.name, frame.name);
+        }
+        let answer: Value = serde_json::from_str(&answer.document().unwrap()).unwrap();
         without_si(&answer, study.name, &mut found);
         found.sort();
         found.dedup();

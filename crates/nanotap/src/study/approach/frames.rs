@@ -2,39 +2,26 @@
 
 use super::{ApproachPoint, ApproachReport, StateJump};
 use crate::case::units::Units;
-use crate::frame::{AsCell as _, Cell, Form, Frame, Rows, columns};
+use crate::frame::{AsCell as _, Cell, Form, Frame, Rows, columns, frame};
 use crate::observe::{Dimension, ObservableSet};
 
 /// Columns of the motions that are shown.
-const MOTIONS: [&str; 9] = [
-    "way",
-    "distance",
-    "motion",
-    "first_harmonic",
-    "A/A0",
-    "phase",
-    "dissipation",
-    "peak_force",
-    "contact_fraction",
-];
-/// Columns that are shown under frequency modulation.
-const MODULATED: [&str; 10] = [
-    "way",
-    "distance",
-    "frequency_shift",
-    "relative_shift",
-    "first_order_shift",
-    "drive_ratio",
-    "dissipation",
-    "peak_force",
-    "contact_fraction",
-    "open loop",
-];
+const MOTIONS: &str =
+    "way,distance,motion,first_harmonic,A/A0,phase,dissipation,peak_force,contact_fraction";
 
 /// Smallest relative uncertainty of a distance that is shown.
 const SHOWN_UNCERTAINTY: f64 = 1e-9;
 
 impl ApproachReport {
+    /// All tables.
+    pub(in crate::study) fn tables(&self, units: Units) -> Vec<Frame<'_>> {
+        vec![
+            self.motion_table(units),
+            self.jump_table(units),
+            self.bifurcation_table(units),
+        ]
+    }
+
     /// The motions of both directions, then the coexisting ones.
     pub fn motion_table(&self, units: Units) -> Frame<'_> {
         let is_si = matches!(units, Units::Si(_));
@@ -54,23 +41,22 @@ impl ApproachReport {
             "", "open loop", Plain => |p| p.orbit.as_ref().map(|orbit| orbit.stability.name());
         };
         let Some(modulation) = &self.modulation else {
-            return rows.frame().shown(&MOTIONS[..]);
+            return rows.shown(MOTIONS).frame();
         };
-        let mut shown = MODULATED;
-        if modulation.closest.is_some() {
-            shown[1] = "first_harmonic";
-        }
-        let frame = rows.fields(|p| p.modulation.as_ref()).frame();
-        frame
-            .shown(shown.to_vec())
-            .right(&["relative_shift", "first_order_shift"])
+        let place = modulation.closest.map_or("distance", |_| "first_harmonic");
+        let shown = format!(
+            "way,{place},frequency_shift,relative_shift,first_order_shift,drive_ratio,dissipation,\
+             peak_force,contact_fraction,open loop"
+        );
+        let rows = rows.fields(|p| p.modulation.as_ref()).shown(shown);
+        rows.right(&["relative_shift", "first_order_shift"]).frame()
     }
 
     /// The jumps of the lever from one motion to another.
     pub fn jump_table(&self, units: Units) -> Frame<'_> {
         let before = |j: &'_ StateJump| Some(j.before.observables.as_ref()?.phase);
         let after = |j: &'_ StateJump| Some(j.after.observables.as_ref()?.phase);
-        let rows = columns! { Rows::new("jumps", &self.jumps, Some(units));
+        frame! { Rows::new("jumps", &self.jumps, Some(units));
             "way", "jump on", Plain => |j| j.way.name();
             "gap", "distance", (Length, Quantity([5, 4])) => |j| j.gap;
             "reason", "at", Plain => move |j| j.shown_reason(units);
@@ -80,21 +66,19 @@ impl ApproachReport {
             "after", "to", Plain => |j| j.after.motion();
             "ratio_after", "A/A0", Digits(4) => |j| self.amplitude_ratio(&j.after);
             "phase_after", "phase", (Angle, Digits(4)) => after;
-        };
-        rows.frame()
+        }
     }
 
     /// The bifurcations of the branches.
     pub fn bifurcation_table(&self, units: Units) -> Frame<'_> {
         let branches = self.branches.iter();
         let all = branches.flat_map(|branches| &branches.bifurcations);
-        let rows = columns! { Rows::new("bifurcations", all, Some(units));
+        frame! { Rows::new("bifurcations", all, Some(units));
             "kind", "", Plain => |b| b.kind;
             "parameter", "distance", (Length, Quantity([5, 4])) => |b| b.parameter;
             "period", "period", Plain => |b| b.period;
             .observed(ObservableSet::FIRST_HARMONIC, |b| Some(&b.observables));
-        };
-        rows.frame()
+        }
     }
 
     /// Amplitude of a motion over the free amplitude.

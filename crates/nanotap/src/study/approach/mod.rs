@@ -24,6 +24,7 @@ pub(in crate::study) mod quasistatic;
 mod ramp;
 
 use nanotap_dynamics::{ContinuationOptions, Control, PeriodicOrbit};
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +32,8 @@ use crate::Error;
 use crate::case::physical::Kind;
 use crate::case::units::{NumbersInSi, Units};
 use crate::case::{Case, Key, ParameterUnit};
+use crate::figure::approach::approach_figure;
+use crate::frame::Frame;
 use crate::model::Model;
 use crate::observe::{Clearance, ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::branch::{BranchOptions, BranchReport};
@@ -745,6 +748,14 @@ impl Study for ApproachStudy {
     const PARTIAL: bool = true;
     type Options = ApproachOptions;
     type Report = ApproachReport;
+
+    fn frames<'a>(case: &Case, report: &'a ApproachReport) -> Vec<Frame<'a>> {
+        report.tables(case.units())
+    }
+
+    fn figure(case: &Case, report: &ApproachReport) -> Option<Figure> {
+        Some(approach_figure(report, &case.units()))
+    }
 
     fn compute(
         case: &Case,

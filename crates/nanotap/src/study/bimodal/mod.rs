@@ -14,6 +14,7 @@ mod formulas;
 mod loops;
 mod torus;
 
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +23,8 @@ pub use formulas::{Estimates, ToneEstimates};
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::frame::{Align, Frame, Rows, columns, rows};
+use crate::figure::bimodal::bimodal_figure;
+use crate::frame::{Frame, Rows, frame, rows};
 use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
@@ -209,11 +211,11 @@ impl BimodalReport {
     /// The free lever at both tones.
     pub fn free_table(&self) -> Frame<'_> {
         let tones = ["first tone", "second tone"].into_iter().zip(&self.free);
-        let rows = columns! { Rows::new("free", tones, None);
+        frame! { Rows::new("free", tones, None);
             "tone", "free lever", Plain => |(name, _)| name;
             .fields(|(_, tone)| Some(tone));
-        };
-        rows.frame().aligned(Align::Left, Align::Point)
+            .aligned(Left, Point);
+        }
     }
 
     /// The motion at each distance. A loop decides which quantities of a tone vary and are shown.
@@ -235,15 +237,16 @@ impl BimodalReport {
         };
         let shown = ["distance"].into_iter().chain(varying(0)).chain(varying(1));
         let shown: Vec<&str> = shown.chain(["peak_force", "formula_modulus"]).collect();
-        let rows = columns! { Rows::new("table", &self.table, None);
+        frame! { Rows::new("table", &self.table, None);
             "distance", "distance", (Length, Prefixed(4)) => |p| p.zc;
             .fields_of(0, |p| Some(&p.tones[0]));
             .fields_of(1, |p| Some(&p.tones[1]));
             .fields(Some);
             "formula_modulus", "E* by formula", (Si(Kind::Pressure), Prefixed(4)) =>
                 |p| p.estimates.reduced_modulus;
-        };
-        rows.frame().shown(shown).aligned(Align::Left, Align::Left)
+            .shown(shown.join(","));
+            .aligned(Left, Left);
+        }
     }
 }
 
@@ -285,6 +288,14 @@ impl Study for BimodalStudy {
     const ANY_RATIO: bool = true;
     type Options = BimodalOptions;
     type Report = BimodalReport;
+
+    fn frames<'a>(_: &Case, report: &'a BimodalReport) -> Vec<Frame<'a>> {
+        vec![report.point_table(), report.free_table()]
+    }
+
+    fn figure(_: &Case, report: &BimodalReport) -> Option<Figure> {
+        Some(bimodal_figure(report))
+    }
 
     fn compute(
         case: &Case,

@@ -20,7 +20,9 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
+use crate::figure::fit::fit_map_figure;
 use crate::study::{Computation, DatasetPlan, DatasetStudy, Study as _};
+use nanotap_figures::Figure;
 
 /// Largest number of pixels of a map.
 const MAX_PIXELS: usize = 1 << 18;
@@ -63,6 +65,10 @@ impl DatasetStudy for FitMap {
 
     fn report(store: &Store) -> Result<FitMapReport, StoreError> {
         FitMapReport::of(store)
+    }
+
+    fn figure(store: &Store) -> Result<Figure, StoreError> {
+        fit_map_figure(store)
     }
 }
 

@@ -44,9 +44,12 @@ pub(crate) mod thin;
 use nanotap_dynamics::Control;
 
 pub use crate::case::table::{Entry, MAX_ROWS, Table};
+use crate::figure::fit::fit_figure;
+use crate::frame::Frame;
 pub(crate) use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use map::{FitMap, FitMapReport, MappedParameter};
+use nanotap_figures::Figure;
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
@@ -142,6 +145,14 @@ impl Study for FitStudy {
     const PARTIAL: bool = true;
     type Options = FitOptions;
     type Report = FitReport;
+
+    fn frames<'a>(_: &Case, report: &'a FitReport) -> Vec<Frame<'a>> {
+        vec![report.row_table(), report.law_table()]
+    }
+
+    fn figure(_: &Case, report: &FitReport) -> Option<Figure> {
+        Some(fit_figure(report))
+    }
 
     fn compute(
         case: &Case,

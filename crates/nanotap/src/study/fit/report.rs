@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::frame::{Frame, Rows, columns, frame};
 use crate::study::approach::Way;
 
 /// Report of a fit. Values are in SI for a physical case, otherwise in the model's units; phases in
@@ -83,6 +84,47 @@ pub struct FitReport {
     pub case_files: Vec<CurveCase>,
     /// Whether the computation was cancelled before it was finished.
     pub cancelled: bool,
+}
+
+impl FitReport {
+    /// The rows of the data: measured and model values of each column, and the residuals.
+    pub fn row_table<'a>(&'a self) -> Frame<'a> {
+        let unit = |unit: &str| match unit {
+            "1" => String::new(),
+            unit => format!(" ({unit})"),
+        };
+        let at = format!("{}{}", self.swept, unit(&self.swept_unit));
+        let mut rows = columns! { Rows::new("rows", &self.rows, None);
+            "curve", "curve", Plain => |row| row.curve.replace([',', '"', '\n'], " ");
+            "line", "line", Plain => |row| row.line as usize;
+            at, self.swept.clone(), Digits(5) => |row| row.at;
+            "branch", "branch", Plain => |row| row.branch;
+        };
+        for column in &self.columns {
+            let (name, unit) = (&column.name, unit(&column.unit));
+            let [measured, model] = ["", " model"].map(|word| format!("{name}{word}{unit}"));
+            let reading = move |row: &'a FittedRow| row.readings.get(name);
+            rows = columns! { rows;
+                measured, "measured", Digits(5) => move |row| reading(row)?.measured;
+                model, "model", Digits(5) => move |row| reading(row)?.model;
+                format!("{name} residual"), "residual", Digits(3) => move |row| reading(row)?.residual;
+            };
+        }
+        rows.frame()
+    }
+
+    /// The laws that were compared.
+    pub fn law_table(&self) -> Frame<'_> {
+        frame! { Rows::new("laws", &self.laws, None);
+            "law", "law", Plain => |law| &law.law;
+            "aic", "AIC", Digits(6) => |law| law.aic;
+            "bic", "BIC", Digits(6) => |law| law.bic;
+            "above_best", "above the least", Digits(3) => |law| law.above_best;
+            "weight", "weight", Digits(3) => |law| law.weight;
+            "fits", "fits", Plain => |law| if law.fits { "yes" } else { "no" };
+            .aligned(Right, Right);
+        }
+    }
 }
 
 /// A contact law among others that were fitted to the same data.

@@ -40,11 +40,14 @@ pub(crate) use rest::{Chain, RestLever, StableRest};
 
 use crate::Error;
 use crate::case::Case;
+use crate::figure::force_curve::force_curve_figure;
+use crate::frame::Frame;
 use crate::study::Study;
 use crate::study::approach::Way;
 use crate::study::limits::{MAX_DISTANCES, MAX_PERIODS};
 use crate::study::request::options;
 use crate::study::value::Amount;
+use nanotap_figures::Figure;
 
 options! {
     /// Options of a force curve.
@@ -117,6 +120,18 @@ impl Study for ForceCurveStudy {
 
     const COUNTED: &'static str = "points";
     const ANY_DISTANCE: bool = true;
+
+    fn frames<'a>(_: &Case, report: &'a ForceCurveReport) -> Vec<Frame<'a>> {
+        vec![
+            report.point_table(),
+            report.result_table(),
+            report.fit_table(),
+        ]
+    }
+
+    fn figure(_: &Case, report: &ForceCurveReport) -> Option<Figure> {
+        Some(force_curve_figure(report))
+    }
 
     fn compute(
         case: &Case,

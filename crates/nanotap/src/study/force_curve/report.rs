@@ -11,7 +11,7 @@ use super::statics::{Rest, StaticCurve, StaticsFound};
 use crate::case::key::Key;
 use crate::case::physical::force::SampleForce;
 use crate::case::physical::sample::Elastic;
-use crate::frame::{Align, AsCell as _, Frame, Rows, columns, rows};
+use crate::frame::{AsCell as _, Frame, Rows, frame, rows};
 use crate::observe::OutOfRange;
 use crate::study::moving_lever::Signals;
 
@@ -174,27 +174,27 @@ pub struct ForceCurveReport {
 impl ForceCurveReport {
     /// The points of approach and retract.
     pub fn point_table(&self) -> Frame<'_> {
-        let rows = columns! { Rows::new("table", &self.points, None);
-            "way", "way", Plain => |p| p.way.name();
-            .fields(Some);
-        };
-        let undriven = if self.driven {
-            &[][..]
+        let undriven: &[&str] = if self.driven {
+            &[]
         } else {
             &["amplitude", "phase"]
         };
-        rows.frame().without(undriven)
+        frame! { Rows::new("table", &self.points, None);
+            "way", "way", Plain => |p| p.way.name();
+            .fields(Some);
+            .without(undriven);
+        }
     }
 
     /// The results.
     pub fn result_table(&self) -> Frame<'_> {
         let at_rest = |report: &'_ Self| Some(-report.statics.pull_off?.force);
-        let rows = columns! { Rows::new("summary", [self], None);
+        frame! { Rows::new("summary", [self], None);
             .fields(|report| Some(&report.summary));
             "", "  at rest", (Force, Prefixed(5)) => at_rest;
             .label("the same without inertia, until the lever jumps off");
-        };
-        rows.frame().shown(&RESULTS[..])
+            .shown(RESULTS);
+        }
     }
 
     /// The fits of contact models to the unloading part, and the moduli of the case.
@@ -211,28 +211,19 @@ impl ForceCurveReport {
         let own = self.reduced_modulus.filter(|_| !self.fits.is_empty());
         let own = own.map(|reduced| ("of the case", reduced, self.modulus, None));
         let modulus = |e: Option<f64>| e.map_or_else(|| "none".cell(), |e| e.cell());
-        let rows = columns! { Rows::new("fits", fits.chain(own), None);
+        frame! { Rows::new("fits", fits.chain(own), None);
             "model", "fit of the unloading", Plain => |f| f.0;
             "reduced_modulus", "E*", (Si(Kind::Pressure), Prefixed(5)) => |f| f.1;
             "modulus", "E of the sample", (Si(Kind::Pressure), Prefixed(5)) => move |f| modulus(f.2);
             "residual", "rms", (Length, Scaled(-12, 3)) => |f| f.3;
-        };
-        rows.frame().aligned(Align::Left, Align::Point)
+            .aligned(Left, Point);
+        }
     }
 }
 
-/// Results that are shown, in this order.
-const RESULTS: [&str; 9] = [
-    "contact_begin",
-    "contact_end",
-    "peak_force",
-    "adhesion_force",
-    "  at rest",
-    "indentation",
-    "adhesion_energy",
-    "energy_lost",
-    "dissipation",
-];
+/// Results that are shown.
+const RESULTS: &str = "contact_begin,contact_end,peak_force,adhesion_force,  at rest,indentation,\
+                       adhesion_energy,energy_lost,dissipation";
 
 /// Fraction of the resonance frequency above which the inertia of a moving base matters.
 const FAST: f64 = 0.1;

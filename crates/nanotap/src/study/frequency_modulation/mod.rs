@@ -21,6 +21,7 @@ pub use free::FreeOscillation;
 pub use held::{Driven, Held, HeldOrbit};
 
 use nanotap_dynamics::Control;
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -28,6 +29,8 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use crate::figure::approach::approach_figure;
+use crate::frame::Frame;
 use crate::frame::rows;
 use crate::model::parameter::Parameter;
 use crate::study::Study;
@@ -292,6 +295,14 @@ impl Study for FrequencyModulationStudy {
     const PARTIAL: bool = true;
     type Options = FrequencyModulationOptions;
     type Report = ApproachReport;
+
+    fn frames<'a>(case: &Case, report: &'a ApproachReport) -> Vec<Frame<'a>> {
+        report.tables(case.units())
+    }
+
+    fn figure(case: &Case, report: &ApproachReport) -> Option<Figure> {
+        Some(approach_figure(report, &case.units()))
+    }
 
     fn compute(
         case: &Case,

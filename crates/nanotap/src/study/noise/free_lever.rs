@@ -9,7 +9,7 @@ use super::Thermal;
 use crate::case::key::Key;
 use crate::case::physical::Physical;
 use crate::case::physical::fluid::{Fluid, hydrodynamic_function};
-use crate::frame::{Frame, Rows, columns};
+use crate::frame::{Frame, Rows, frame};
 
 /// Density and viscosity of air at 300 K, as Sader, Chon and Mulvaney take them (Rev. Sci. Instrum. 70,
 /// 3967, 1999).
@@ -57,11 +57,10 @@ impl ThermalSpectrum {
     /// The spectrum as a table.
     pub fn table(&self) -> Frame<'_> {
         let rows = self.frequency.iter().zip(&self.density);
-        let rows = columns! { Rows::new("spectrum", rows, None);
+        frame! { Rows::new("spectrum", rows, None);
             "frequency", "frequency", (Frequency, Digits(5)) => |(frequency, _)| frequency;
             "density", "density", (Unit("m^2/Hz"), Digits(5)) => |(_, density)| density;
-        };
-        rows.frame()
+        }
     }
 }
 

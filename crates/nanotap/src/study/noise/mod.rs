@@ -21,6 +21,7 @@ use crate::case::key::Key;
 use crate::case::physical::Kind;
 use crate::case::state::WrittenState;
 use crate::control::Control;
+use crate::frame::Frame;
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
@@ -170,6 +171,10 @@ impl Study for NoiseStudy {
     const COUNTED: &'static str = "steps";
     type Options = NoiseOptions;
     type Report = NoiseReport;
+
+    fn frames<'a>(_: &Case, report: &'a NoiseReport) -> Vec<Frame<'a>> {
+        vec![report.spectrum.table()]
+    }
 
     fn compute(
         case: &Case,

@@ -20,6 +20,7 @@ mod smooth;
 
 use nanotap_arithmetic::powf;
 use nanotap_dynamics::Control;
+use nanotap_figures::Figure;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +33,8 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind as Quantity;
 use crate::case::table::Table;
+use crate::figure::reconstruct::reconstruct_figure;
+use crate::frame::Frame;
 use crate::study::approach::Way;
 use crate::study::fit::Data;
 use crate::study::fit::instrument::{self, wrapped};
@@ -129,6 +132,14 @@ impl Study for ReconstructStudy {
     const ANY_DISTANCE: bool = true;
     type Options = ReconstructOptions;
     type Report = ReconstructReport;
+
+    fn frames<'a>(_: &Case, report: &'a ReconstructReport) -> Vec<Frame<'a>> {
+        vec![report.force_table()]
+    }
+
+    fn figure(_: &Case, report: &ReconstructReport) -> Option<Figure> {
+        Some(reconstruct_figure(report))
+    }
 
     fn compute(
         case: &Case,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::units::Units;
-use crate::frame::{Align, FileUnit, Frame, Rows, columns};
+use crate::frame::{FileUnit, Frame, Rows, frame};
 use crate::study::approach::Way;
 
 /// Force and dissipation from a measured curve. Values are in SI for a physical case, otherwise in
@@ -185,7 +185,7 @@ impl ReconstructReport {
         let nano: fn(f64) -> f64 = |value| 1e9 * value;
         let ev: FileUnit = (|joules| 1.0 / JOULES_PER_ELECTRONVOLT * joules, "eV");
         let units = (!self.physical).then_some(Units::Model);
-        let rows = columns! { Rows::new("table", 0..curve.distance.len(), units);
+        frame! { Rows::new("table", 0..curve.distance.len(), units);
             "distance", "distance", (Length, Quantity([4, 4])) => |k| curve.distance[k];
             .in_files((nano, "nm"));
             "force", "force", (Force, Quantity([4, 4])) => |k| curve.force[k];
@@ -205,8 +205,8 @@ impl ReconstructReport {
             "", "dissipation", (Energy, Quantity([4, 4])) => move |k| clear(&curve.dissipation, k);
             "", "standard error", (Energy, Quantity([4, 4])) =>
                 move |k| clear(&curve.dissipation_error, k);
-        };
-        rows.frame().aligned(Align::Point, Align::Point)
+            .aligned(Point, Point);
+        }
     }
 }
 

@@ -31,8 +31,10 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
+use crate::figure::scan::scan_figure;
 use crate::frame::Row;
 use crate::study::{Computation, DatasetPlan, DatasetStudy, Study as _};
+use nanotap_figures::Figure;
 
 /// Attribute with the report before its lines, as JSON.
 const HEADER: &str = "scan";
@@ -137,6 +139,10 @@ impl DatasetStudy for ScanLines {
         }
         let pixels = schema.coordinate("x").map_or(0, |x| x.values.len());
         Ok(with_lines(header, recorded, [lines.len(), pixels]))
+    }
+
+    fn figure(store: &Store) -> Result<Figure, StoreError> {
+        Ok(scan_figure(&Self::report(store)?))
     }
 }
 

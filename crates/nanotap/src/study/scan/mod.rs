@@ -41,7 +41,10 @@ pub use report::{
 
 use crate::Error;
 use crate::case::Case;
+use crate::figure::scan::scan_figure;
+use crate::frame::Frame;
 use crate::study::Study;
+use nanotap_figures::Figure;
 use plan::Plan;
 use recorder::LineRecord;
 use run::{Recorded, Settled};
@@ -75,6 +78,14 @@ impl Study for ScanStudy {
     const COUNTED: &'static str = "drive periods";
     const PARTIAL: bool = true;
     const ANY_DISTANCE: bool = true;
+
+    fn frames<'a>(_: &Case, report: &'a ScanReport) -> Vec<Frame<'a>> {
+        vec![report.pixel_table(), report.line_table()]
+    }
+
+    fn figure(_: &Case, report: &ScanReport) -> Option<Figure> {
+        Some(scan_figure(report))
+    }
 
     fn compute(
         case: &Case,

@@ -50,7 +50,7 @@ rows! {
         /// Energy that the tip gives to the sample in the period, J.
         pub dissipation: f64 = Energy, "dissipated energy",
         /// Force that governs the motion in the period.
-        pub state: Interaction,
+        pub state: Interaction = Number, "governing force",
     }
 }
 
@@ -178,6 +178,7 @@ macro_rules! channels {
                 pub $name: Vec<Vec<f64>>,
             )*
             /// Force that governs the motion in most periods of a pixel.
+            #[schemars(extend("x-unit" = "1", "x-label" = "governing force"))]
             pub state: Vec<Vec<Option<Interaction>>>,
         }
 

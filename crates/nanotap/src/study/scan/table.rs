@@ -4,7 +4,7 @@ use super::instrument::Interaction;
 use super::report::{CHANNELS, Channel, Channels, Direction, LineStatistics, ScanReport};
 use crate::case::quantity::prefix_of;
 use crate::dataset::gsf::Field;
-use crate::frame::{AsCell, Cell, Form, Frame, Rows, columns, finite};
+use crate::frame::{AsCell, Cell, Form, Frame, Rows, columns, finite, frame};
 
 impl Channel {
     /// SI unit in files; empty for a number without unit.
@@ -104,10 +104,9 @@ impl ScanReport {
             });
             rows.label(channel.label)
         };
-        let rows = columns! { CHANNELS.iter().fold(rows, with);
+        frame! { CHANNELS.iter().fold(rows, with);
             "state", "state", Plain => |((line, _, image), k, _)| image.state[line][k];
-        };
-        rows.frame()
+        }
     }
 
     /// The statistics of the lines.
@@ -116,23 +115,15 @@ impl ScanReport {
             let lengths = line.parachuting.iter().map(|flight| flight.length);
             lengths.fold(0.0, f64::max)
         };
-        let rows = columns! { Rows::new("lines", &self.lines, None);
+        frame! { Rows::new("lines", &self.lines, None);
             "direction", "", Plain => |line| line.direction.name();
             .fields(Some);
             "", "parachuting", (Length, Scaled(-9, 3)) => longest;
-        };
-        rows.frame().shown(&LINES[..])
+            .shown(LINES);
+        }
     }
 }
 
 /// Columns of the lines that are shown.
-const LINES: [&str; 8] = [
-    "line",
-    "direction",
-    "height_rms",
-    "error_rms",
-    "tracking_rms",
-    "peak_force_max",
-    "parachuting",
-    "overshoot",
-];
+const LINES: &str =
+    "line,direction,height_rms,error_rms,tracking_rms,peak_force_max,parachuting,overshoot";

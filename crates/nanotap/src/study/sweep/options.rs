@@ -14,6 +14,7 @@ use crate::study::request::options;
 use crate::study::target::Targets;
 use crate::study::value::{Axes, Intervals};
 use crate::study::{DatasetPlan, DatasetStudy};
+use nanotap_figures::Figure;
 
 options! {
     /// Options of a sweep.
@@ -158,5 +159,9 @@ impl DatasetStudy for SweepStudy {
 
     fn report(store: &Store) -> Result<Summary, StoreError> {
         Summary::of(store)
+    }
+
+    fn figure(store: &Store) -> Result<Figure, StoreError> {
+        crate::figure::sweep::figure(store)
     }
 }

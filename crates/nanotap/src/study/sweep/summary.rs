@@ -10,6 +10,7 @@ use super::dataset::{CLASSES, DISTANCE, HELD, UNREACHED, class_of};
 use super::{FromNeighbour, from_neighbours};
 use crate::case::Key;
 use crate::dataset::{Store, StoreError};
+use crate::frame::{Frame, Rows, frame};
 use crate::observe::ObservableSet;
 use crate::study::simulate::Classification;
 use crate::study::target::{Target, TargetMotion, TargetPoint, TargetReport, Targets};
@@ -40,6 +41,35 @@ pub struct Summary {
     /// that others lead to.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+}
+
+/// Periods of which the runs are counted one by one.
+const COUNTED_PERIODS: usize = 12;
+
+impl Summary {
+    /// The runs by their result; the periodic ones by their period, too.
+    pub fn count_table(&self) -> Frame<'_> {
+        let mut all: Vec<(String, usize)> = Vec::new();
+        for (name, count) in &self.counts {
+            if *count > 0 {
+                all.push(((*name).to_owned(), *count));
+            }
+            if *name == "periodic" {
+                let periods = self.periods.iter().take(COUNTED_PERIODS);
+                all.extend(periods.map(|(period, count)| (format!("  period {period}"), *count)));
+                if self.periods.len() > COUNTED_PERIODS {
+                    let longer = self.periods.values().skip(COUNTED_PERIODS).sum();
+                    all.push(("  longer".to_owned(), longer));
+                }
+            }
+        }
+        let part = |count: usize| 100.0 * count as f64 / self.runs.max(1) as f64;
+        frame! { Rows::new("counts", all, None);
+            "motion", "motion", Plain => |(name, _)| name;
+            "runs", "runs", Plain => |(_, count)| count;
+            "percent", "%", Digits(3) => move |(_, count)| part(count);
+        }
+    }
 }
 
 /// Values of the parameters at which the setpoint is not reached.

@@ -1,6 +1,11 @@
 //! A rigid impact oscillator, ẍ + 0.1 ẋ + x = cos ωt with a wall at x = g of restitution 0.8,
 //! whose orbits follow from closed forms.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references are the platform's own functions"
+)]
+
 use nanotap_proof::{
     Candidate, HarmonicVector, Interval, Matrix, Output, ProofError, Rectangle, RegimeParts, Reset,
     RigidStop, Stability, Switch, System, Transition, prove, prove_sticking,

@@ -163,7 +163,7 @@ pub static ELECTROSTATIC_AC: Entry = Entry {
         PERMITTIVITY,
     ],
     parts: &[],
-    attracts: false,
+    attracts: true,
     conservative: false,
 };
 

@@ -326,3 +326,32 @@ fn dissipation_of_a_capillary_bridge() {
         expected / EV
     );
 }
+
+/// An electrostatic attraction ends at the contact distance, which is 0.165 nm where it is not stated:
+/// at 0 the force would have no bound, and no motion would touch.
+#[test]
+fn an_ac_voltage_attracts_down_to_a_contact_distance() {
+    let words = [
+        "modes=1",
+        "cantilever.k=2 N/m",
+        "cantilever.f0=75 kHz",
+        "cantilever.Q=100",
+        "tip.radius=20 nm",
+        "sample.law=hertz + electrostatic-ac",
+        "sample.modulus=2 GPa",
+        "sample.poisson=0.3",
+        "sample.voltage=1 V",
+        "sample.ac_voltage=1 V",
+        "drive.actuation=tip",
+        "drive.frequency=75 kHz",
+        "drive.free_amplitude=20 nm",
+        "drive.second_ratio=2",
+        "drive.second_free_amplitude=0 nm",
+        "gap.tip=15 nm",
+    ];
+    let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
+    let case = Case::parse(None, &words).unwrap();
+    let found = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
+    assert!(found.observables.contact_fraction > 0.0);
+    assert!(found.observables.least_force.is_finite() && found.observables.peak_force > 0.0);
+}

@@ -444,7 +444,7 @@ fn the_varied_key_may_be_missing() {
 }
 
 #[test]
-fn a_sticking_orbit_is_not_followed() {
+fn an_orbit_that_sticks_is_not_exchanged_for_another() {
     let folder = Folder::new();
     folder.write(
         "case.toml",

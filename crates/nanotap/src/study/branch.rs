@@ -553,25 +553,33 @@ fn first_orbit(case: &Case, range: Range, options: &BranchOptions) -> Result<Per
         }
     };
     let found = orbit(&model, &options).map_err(failed)?;
-    if model.rigid_stop.is_some() && spectral_radius(&found.multipliers) == 0.0 {
-        return Err(Error::numerics(format!(
-            "at {}: the motion sticks to the rigid stop; its period-{} orbit is superstable, and such \
-             orbits are not followed",
-            case.named(range.key, range.from),
-            found.period
-        ))
-        .remedy("list the motions at several values with `sweep`, or give a {state} near another orbit"));
-    }
     // Newton again, from where it is, for the orbit itself.
-    nanotap_dynamics::close_orbit_from_points(
+    let closed = nanotap_dynamics::close_orbit_from_points(
         &mut ModelMap::new(&model),
         &found.states.concat(),
         found.period,
         &ShootingOptions::default(),
     )
-    .map_err(|error| failed(error.into()))
+    .map_err(|error| failed(error.into()))?;
+    // Errors grow along a long one that sticks, and Newton's method comes to another orbit.
+    let sticks = model.rigid_stop.is_some() && spectral_radius(&found.multipliers) == 0.0;
+    let is_it = closed.period == found.period
+        && closed.nearest(&found.state).1 <= SAME_STICKING * closed.scale();
+    if sticks && !is_it {
+        return Err(Error::numerics(format!(
+            "at {}: the motion sticks to the rigid stop, and errors grow too fast along its period-{} orbit \
+             to follow it",
+            case.named(range.key, range.from),
+            found.period
+        ))
+        .remedy("list the motions at several values with `sweep`, or give a {state} near another orbit"));
+    }
+    Ok(closed)
 }
 
+/// Largest distance between an orbit that sticks and the one that Newton's method closes from it, as a
+/// part of its size.
+const SAME_STICKING: f64 = 1e-6;
 /// Remedy where the start has no orbit to follow.
 const ELSEWHERE: &str = "begin elsewhere with {from}, or give a {state} near an orbit";
 

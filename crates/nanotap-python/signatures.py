@@ -315,11 +315,11 @@ PPP-FM False 611.1 pN
 """,
 }
 
-# A study without additions: its document, with the names of the terminal's JSON.
+# A study without additions: its report.
 DOCUMENT = (
     (THREADS, PROGRESS),
-    "Record",
-    "The document, with the names of the terminal's JSON.",
+    "Report",
+    "The document, with the names of the terminal's JSON; `.table()`, `.ds` and `.plot()`.",
 )
 
 # Studies that run over arrays of parameters.
@@ -335,7 +335,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
-from ._record import Record
+from ._report import Report
 from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:

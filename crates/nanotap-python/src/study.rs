@@ -1,32 +1,37 @@
 //! Studies: attractors, branches, exponents, convergence, the paper.
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 use nanotap::Error;
+use nanotap::frame::{Cell, Column, Frame};
 use nanotap::study::fit::Table;
 use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
-use nanotap::study::registry::{self, Document, Study as _};
+use nanotap::study::registry::{self, Answer, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
 use nanotap_paper::{Options as PaperOptions, report_so_far, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use serde_json::{Value, json};
 
 use crate::case::CaseCore;
 use crate::failure::Failure;
 use crate::watch::watched;
 
-/// A study: from the JSON of its request to its document, and whether Ctrl-C stopped it.
+/// A study: from the JSON of its request to its document, the JSON of its tables and its figure if
+/// `shown`, and whether Ctrl-C stopped it.
 #[pyfunction]
-#[pyo3(signature = (name, case, request, *, threads=None, progress=None))]
+#[pyo3(signature = (name, case, request, *, shown=false, threads=None, progress=None))]
 pub(crate) fn study(
     py: Python<'_>,
     name: &str,
     case: &CaseCore,
     request: &str,
+    shown: bool,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(String, bool)> {
+) -> PyResult<(String, String, bool)> {
     let entry =
         registry::study(name).ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
     let request = json(request)?;
@@ -37,11 +42,55 @@ pub(crate) fn study(
         case.studied(py)?
     };
     let done = watched(py, progress, move |control| {
-        Ok(install(threads, || {
-            entry.document(&case, request, control)
-        })??)
+        let answer = install(threads, || entry.answer(&case, request, control))??;
+        let shown = if shown {
+            shown_by(&*answer)?
+        } else {
+            String::new()
+        };
+        Ok((answer.document()?, shown))
     })?;
-    Ok((done.result, done.interrupted))
+    let (document, shown) = done.result;
+    Ok((document, shown, done.interrupted))
+}
+
+/// The tables of a report, column by column as in its CSV file, and its figure, as JSON.
+fn shown_by(answer: &dyn Answer) -> Result<String, Error> {
+    let column = |frame: &Frame<'_>, column: &Column<'_>| {
+        let value = |row| match frame.cell(column, row) {
+            Cell::Empty => Value::Null,
+            Cell::Word(word) => word.into(),
+            Cell::Count(count) => count.into(),
+            Cell::Number(number) => number.into(),
+        };
+        json!({
+            "name": name_of(frame, column),
+            "label": column.label,
+            "unit": frame.unit(column.dimension),
+            "values": (0..frame.rows).map(value).collect::<Vec<Value>>(),
+        })
+    };
+    let frames = answer.frames();
+    let tables = frames.iter().map(|frame| {
+        // A file may have a quantity twice, in two units; here it is in SI.
+        let mut names = HashSet::new();
+        let named = frame.columns.iter().filter(|c| !c.name.is_empty());
+        let once = named.filter(|c| names.insert(name_of(frame, c)));
+        let columns: Vec<Value> = once.map(|c| column(frame, c)).collect();
+        json!({ "name": frame.name, "columns": columns })
+    });
+    let figure = answer.figure().map(|figure| figure.to_json()).transpose()?;
+    let tables: Vec<Value> = tables.collect();
+    Ok(json!({ "tables": tables, "figure": figure }).to_string())
+}
+
+/// The name of a column among quantities in SI, or in the model's units.
+fn name_of<'a>(frame: &Frame<'_>, column: &'a Column<'_>) -> &'a str {
+    if frame.is_si() {
+        &column.si_name
+    } else {
+        &column.name
+    }
 }
 
 /// The studies: name, what each is about, what its progress counts, and the JSON schema of its
@@ -72,7 +121,7 @@ pub(crate) fn table(path: PathBuf) -> PyResult<String> {
 }
 
 /// The JSON of a request.
-pub(crate) fn json(request: &str) -> Result<serde_json::Value, Failure> {
+pub(crate) fn json(request: &str) -> Result<Value, Failure> {
     serde_json::from_str(request)
         .map_err(|error| Failure::input(format!("the request is not JSON: {error}")))
 }

@@ -24,6 +24,7 @@ from ._nanotap import __version__
 from ._quantity import Range as range  # noqa: F401 - not for `import *`
 from ._read import read
 from ._record import Record
+from ._report import Report
 from ._results import (
     Attractor,
     Attractors,
@@ -58,6 +59,7 @@ __all__ = [
     "PeriodicOrbit",
     "Reconstruction",
     "Record",
+    "Report",
     "__version__",
     "catalogue",
     "export",

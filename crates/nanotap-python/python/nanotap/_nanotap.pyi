@@ -120,9 +120,10 @@ def study(
     case: CaseCore,
     request: str,
     *,
+    shown: bool = False,
     threads: int | None = None,
     progress: _Progress = None,
-) -> tuple[str, bool]: ...
+) -> tuple[str, str, bool]: ...
 def modes(case: CaseCore, request: str) -> tuple[str, _Floats, _Floats]: ...
 def simulate(
     case: CaseCore, request: str, series_periods: int

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
-from ._record import Record
+from ._report import Report
 from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:
@@ -541,7 +541,7 @@ def fm(
     closest: float | str | None = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> Report:
     """Frequency shift and excitation against the distance to the sample, with amplitude
     and phase held.
 
@@ -572,7 +572,8 @@ def fm(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
+    `.plot()`.
 
     Raises
     ------
@@ -1103,7 +1104,7 @@ def contact_laws(
     to: float | str | None = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> Report:
     """Compare contact laws under the same lever and drive.
 
     Parameters
@@ -1126,7 +1127,8 @@ def contact_laws(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
+    `.plot()`.
 
     Raises
     ------
@@ -1153,7 +1155,7 @@ def noise(
     state: Any = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> Report:
     """Compute thermal noise of amplitude and phase at a working point.
 
     Parameters
@@ -1179,7 +1181,8 @@ def noise(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
+    `.plot()`.
 
     Raises
     ------
@@ -1216,7 +1219,7 @@ def bimodal(
     points: int = 30,
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> Report:
     """Follow AM–FM, FM–FM and other bimodal operation against the distance.
 
     Parameters
@@ -1245,7 +1248,8 @@ def bimodal(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
+    `.plot()`.
 
     Raises
     ------
@@ -1433,7 +1437,7 @@ def force_curve(
     fit_to: float = 0.9,
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> Report:
     """Force curve of approach and retract at a finite speed, with the static branches,
     adhesion, work and fitted moduli.
 
@@ -1471,7 +1475,8 @@ def force_curve(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
+    `.plot()`.
 
     Raises
     ------
@@ -1505,7 +1510,7 @@ def lever(
     quality_factor: Literal["auto", "air", "case"] = "auto",
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> Report:
     """Compare levers of the catalogue on the sample of a case.
 
     Parameters
@@ -1534,7 +1539,8 @@ def lever(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
+    `.plot()`.
 
     Raises
     ------

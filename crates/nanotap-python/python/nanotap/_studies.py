@@ -13,7 +13,7 @@ from ._describe import case_attributes, declared, describe
 from ._interrupt import Interrupted, part_of, stoppable
 from ._motions import _cased, _document, words
 from ._progress import bar
-from ._record import Record
+from ._report import Report
 from ._results import (
     Attractors,
     Convergence,
@@ -40,14 +40,27 @@ def _run(
     progress: Progress = None,
 ) -> tuple[dict[str, Any], bool]:
     """The document of a study, and whether it was stopped by Ctrl-C."""
+    text, _, interrupted = _ran(name, case, options, threads, progress)
+    return _document(text), interrupted
+
+
+def _ran(
+    name: str,
+    case: Case,
+    options: Mapping[str, Any],
+    threads: int | None,
+    progress: Progress,
+    shown: bool = False,
+) -> tuple[str, str, bool]:
+    """The JSON of a study's document, that of its tables and figure if `shown`, and whether it was
+    stopped by Ctrl-C."""
     core = _cased(case)._core
     request = _arguments.request(name, options)
     many = _arguments.optional_count("threads", threads)
     with bar(progress, _arguments.counted(name)) as show:
-        text, interrupted = _nanotap.study(
-            name, core, request, threads=many, progress=show
+        return _nanotap.study(
+            name, core, request, shown=shown, threads=many, progress=show
         )
-    return _document(text), interrupted
 
 
 @stoppable()
@@ -411,10 +424,11 @@ def document(
     options: Mapping[str, Any],
     threads: int | None,
     progress: Progress,
-) -> Record:
-    """The document of a study, with the names of the terminal's JSON."""
-    found, interrupted = _run(name, case, options, threads, progress)
-    return _finished(Record(found), interrupted)
+) -> Report:
+    """The report of a study: its document, with the names of the terminal's JSON, its tables and its
+    figure."""
+    text, shown, interrupted = _ran(name, case, options, threads, progress, shown=True)
+    return _finished(Report(_document(text), shown), interrupted)
 
 
 @stoppable()

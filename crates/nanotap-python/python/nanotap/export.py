@@ -16,6 +16,7 @@ import pandas as pd
 
 from . import _arguments, _nanotap
 from ._case import Path
+from ._report import Report
 from ._results import Attractors, Convergence, Modes, Orbit, Paper
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def table(result: Any) -> pd.DataFrame:
     or the instants of a run or orbit; attractors, modes, convergence and paper have their own
     tables.
     """
-    if isinstance(result, Attractors | Convergence | Modes | Paper):
+    if isinstance(result, Attractors | Convergence | Modes | Paper | Report):
         return result.table()
     if isinstance(result, Orbit):
         if result.series is None:

@@ -16,6 +16,7 @@ from . import _nanotap, _signatures
 from ._case import Case
 from ._describe import name_in_si
 from ._figure import STYLE, Picture, draw, page
+from ._report import Report
 from ._results import (
     Attractors,
     Convergence,
@@ -700,6 +701,8 @@ def convergence(found: Convergence, **where: Unpack[Where]) -> "Figure":
 
 def show(result: Any, **options: Any) -> "Figure":
     """The figure of any result."""
+    if isinstance(result, Report):
+        return result.plot(**options)
     draw_it: Callable[..., Figure]
     for kind, draw_it in _FIGURES.items():
         if isinstance(result, kind):

@@ -544,7 +544,7 @@ mod tests {
                 1.0 - 2e-9,
             ],
         );
-        let found = Multipliers::of_product(&[slow.clone()]).unwrap();
+        let found = Multipliers::of_product(std::slice::from_ref(&slow)).unwrap();
         assert!(found.margin < 1e-11, "{}", found.margin);
         let known = |found: &Multipliers| stability_of(&found.values, found.margin);
         assert_eq!(known(&found), Stability::Stable);

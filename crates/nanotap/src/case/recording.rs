@@ -198,7 +198,7 @@ mod samples;
 mod tests {
     use super::*;
 
-    fn column<'a>(recording: &'a Recording, header: &str) -> Vec<i64> {
+    fn column(recording: &Recording, header: &str) -> Vec<i64> {
         let found = recording.columns.iter().find(|(name, _)| name == header);
         let (_, values) = found.unwrap_or_else(|| panic!("{header} in {recording:?}"));
         values

@@ -46,7 +46,7 @@ def study(request, tmp_path_factory):
 
 def test_the_first_table_is_the_terminals_file(study):
     report, heads, rows, _ = study
-    table = report.table()
+    table = report.to_dataframe()
     assert len(table) == len(rows) > 0
     written: dict[str, tuple[str, list[str]]] = {}
     for head, column in zip(heads, zip(*rows, strict=True), strict=True):
@@ -74,7 +74,9 @@ def test_all_tables_are_a_dataset_with_units(study, tmp_path):
         assert is_text or {"units", "long_name"} <= set(variable.attrs), name
     ds.to_netcdf(tmp_path / "report.nc")
     nanotap.export.csv(report, tmp_path / "table.csv")
-    assert (tmp_path / "table.csv").read_text().count("\n") == len(report.table()) + 1
+    assert (tmp_path / "table.csv").read_text().count("\n") == len(
+        report.to_dataframe()
+    ) + 1
 
 
 def test_a_report_draws_its_figure_and_is_pickled(study):
@@ -87,6 +89,6 @@ def test_a_report_draws_its_figure_and_is_pickled(study):
             report.plot()
     again = pickle.loads(pickle.dumps(report))
     assert again == report
-    assert again.table().equals(report.table())
+    assert again.to_dataframe().equals(report.to_dataframe())
     with pytest.raises(KeyError, match="there is no table `x`"):
-        report.table("x")
+        report.to_dataframe("x")

@@ -319,7 +319,7 @@ PPP-FM False 611.1 pN
 DOCUMENT = (
     (THREADS, PROGRESS),
     "Report",
-    "The document, with the names of the terminal's JSON; `.table()`, `.ds` and `.plot()`.",
+    "The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds` and `.plot()`.",
 )
 
 # Studies that run over arrays of parameters.

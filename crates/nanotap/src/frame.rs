@@ -2,7 +2,7 @@
 //!
 //! A column has a name (JSON, CSV, datasets, Python), the head of tables that are read, the label of
 //! an axis, a dimension and a form. From these follow the CSV file, the tables of the terminal and of
-//! the page, the units and labels in the JSON schema, and the axes of figures. [`rows!`] declares the
+//! the page, the units and labels in the JSON schema, and the axes of figures. `rows!` declares the
 //! columns with the fields of a struct; [`Rows`] adds what no field stores.
 
 use std::borrow::Cow;
@@ -186,7 +186,7 @@ impl<R> Declared<R> {
     }
 }
 
-/// A struct whose fields are declared as columns by [`rows!`].
+/// A struct whose fields are declared as columns by `rows!`.
 pub trait Row: Sized + 'static {
     /// The columns, in the order of the fields.
     const COLUMNS: &'static [Declared<Self>];

@@ -51,7 +51,7 @@ class Report(Record):
 
         return {name: frame(columns) for name, columns in self._columns().items()}
 
-    def table(self, name: str | None = None) -> "pd.DataFrame":
+    def to_dataframe(self, name: str | None = None) -> "pd.DataFrame":
         """The table of this name, or the first one: the rows of the terminal's CSV file."""
         tables = self.tables
         if name is None:

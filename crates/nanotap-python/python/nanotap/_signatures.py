@@ -572,8 +572,8 @@ def fm(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
-    `.plot()`.
+    The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds`
+    and `.plot()`.
 
     Raises
     ------
@@ -1127,8 +1127,8 @@ def contact_laws(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
-    `.plot()`.
+    The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds`
+    and `.plot()`.
 
     Raises
     ------
@@ -1181,8 +1181,8 @@ def noise(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
-    `.plot()`.
+    The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds`
+    and `.plot()`.
 
     Raises
     ------
@@ -1248,8 +1248,8 @@ def bimodal(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
-    `.plot()`.
+    The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds`
+    and `.plot()`.
 
     Raises
     ------
@@ -1475,8 +1475,8 @@ def force_curve(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
-    `.plot()`.
+    The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds`
+    and `.plot()`.
 
     Raises
     ------
@@ -1539,8 +1539,8 @@ def lever(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON; `.table()`, `.ds` and
-    `.plot()`.
+    The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds`
+    and `.plot()`.
 
     Raises
     ------

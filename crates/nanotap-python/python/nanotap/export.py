@@ -30,8 +30,10 @@ def table(result: Any) -> pd.DataFrame:
     or the instants of a run or orbit; attractors, modes, convergence and paper have their own
     tables.
     """
-    if isinstance(result, Attractors | Convergence | Modes | Paper | Report):
+    if isinstance(result, Attractors | Convergence | Modes | Paper):
         return result.table()
+    if isinstance(result, Report):
+        return result.to_dataframe()
     if isinstance(result, Orbit):
         if result.series is None:
             message = "only an orbit found by nanotap.orbit has a time series"

@@ -849,6 +849,8 @@ def test_a_rectangle_zooms_and_a_double_click_shows_all_again(
     page: Any, address: str
 ) -> None:
     opened(page, address, "preset=paper")
+    # The table of the approach curve moves the figure below it.
+    page.wait_for_selector("#tables table")
     before = panels(page, "portrait")[1]
     page.mouse.move(*spot(page, "portrait", 1, 0.25, 0.25))
     page.mouse.down()
@@ -860,6 +862,8 @@ def test_a_rectangle_zooms_and_a_double_click_shows_all_again(
     page.mouse.move(*spot(page, "portrait", 1, 0.75, 0.5))
     page.mouse.up()
     until(page, lambda: "view.portrait.1=" in page.url)
+    # Two hundred distances are a table that scrolls by itself.
+    assert page.locator("#tables > div").bounding_box()["height"] < 400
     after = panels(page, "portrait")[1]
     for axis, low, high in (("x", 0.25, 0.75), ("y", 0.25, 0.5)):
         start = before[axis]["from"]

@@ -419,7 +419,8 @@ function show(tables) {
       if (set) { line.className = "choice"; line.addEventListener("click", () => adopt(set)); }
       return line;
     })));
-    return make("div", table);
+    // A long table scrolls by itself, also by keys, so that what is below stays in reach.
+    return Object.assign(make("div", table), { tabIndex: 0, role: "region", ariaLabel: title || "table" });
   }));
   if (!found) return;
   const { set, take, file, save: words, name } = found;

@@ -45,8 +45,8 @@ pub(crate) fn table(title: &str, heads: &[(&str, &str)], rows: &[Value]) -> Valu
     json!({ "title": title, "heads": heads, "rows": rows })
 }
 
-/// A frame as a table: the heads and cells of the terminal, with labels as their meanings.
-pub(crate) fn of_frame(frame: &Frame<'_>) -> Value {
+/// A frame as a table with a title: the heads and cells of the terminal, with labels as their meanings.
+pub(crate) fn of_frame(title: &str, frame: &Frame<'_>) -> Value {
     let columns = frame.shown_columns();
     let titles: Vec<String> = columns.iter().map(|column| frame.head(column)).collect();
     let heads = titles.iter().zip(&columns);
@@ -57,7 +57,7 @@ pub(crate) fn of_frame(frame: &Frame<'_>) -> Value {
         let cells: Vec<String> = columns.iter().map(|c| frame.text(c, k)).collect();
         row(&cells, None)
     });
-    table(frame.name, &heads, &rows.collect::<Vec<_>>())
+    table(title, &heads, &rows.collect::<Vec<_>>())
 }
 
 /// A row of cells. With changes to the case, a click on it makes them.

@@ -43,7 +43,10 @@ impl Studied<'_> {
                 figure: Some(drawn.figure),
                 words: progress(points, finest, "distances each way"),
                 studies: &[("approach", &options)],
-                tables: vec![report::of_frame(&found.motion_table(units))],
+                tables: vec![report::of_frame(
+                    "motions on the curve",
+                    &found.motion_table(units),
+                )],
                 ..Stage::default()
             })
         })

@@ -45,7 +45,7 @@ impl Studied<'_> {
             words: format!("{}{gain}", scanned.verdict),
             studies: &[("scan", &options)],
             scan: Self::scan_table(&case, surface),
-            tables: vec![report::of_frame(&scanned.line_table())],
+            tables: vec![report::of_frame("lines", &scanned.line_table())],
             ..Stage::default()
         })
     }

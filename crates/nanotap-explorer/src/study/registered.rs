@@ -37,7 +37,8 @@ impl Studied<'_> {
             let mut tables = report::tables(&document, schema.as_value());
             if !frames.is_empty() {
                 tables.truncate(1);
-                tables.extend(frames.iter().filter(|f| f.rows > 0).map(report::of_frame));
+                let filled = frames.iter().filter(|frame| frame.rows > 0);
+                tables.extend(filled.map(|frame| report::of_frame(frame.name, frame)));
             }
             (answer.figure(), tables)
         } else {

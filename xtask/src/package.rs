@@ -52,7 +52,9 @@ fn forget(target: &Path) {
     });
     let unpacked = registries.filter_map(|registry| fs::read_dir(registry.path()).ok());
     for crate_ in unpacked.flatten().flatten() {
-        if crate_.file_name().to_string_lossy().starts_with("nanotap") {
+        let name = crate_.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("nanotap") || name.starts_with("afm-files") {
             let _ = fs::remove_dir_all(crate_.path());
         }
     }

@@ -2,8 +2,7 @@
 
 use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, Document, Segment, Style};
-use crate::limits::{Budget, MAX_CHANNELS, MAX_HEADER, at_most};
-use crate::table::{Layout, rows};
+use crate::table::{Heading, headed};
 use crate::text::{any, number};
 use crate::{Error, Format, Limits};
 
@@ -15,44 +14,20 @@ const NAMES: Names = Names {
     grows_toward_surface: true,
 };
 
+const HEADING: Heading = Heading {
+    setting: "\t",
+    begins: &["Time (s)"],
+    shown: "Time (s)",
+    separator: '\t',
+};
+
 pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     let text = any(bytes);
     let mut document = Document::new(Format::Chiaro, limits);
-    let mut lines = text.lines().enumerate();
-    let mut length = 0;
-    let (number_of_names, names) = loop {
-        let Some((number, line)) = lines.next() else {
-            return Err(Format::Chiaro.at_key("Time (s)", "no such line", "the head of a table"));
-        };
-        if line.starts_with("Time (s)") {
-            break (number, line);
-        }
-        length += line.len();
-        at_most(length, MAX_HEADER, "bytes in a header")?;
-        if let Some((key, value)) = line.split_once('\t') {
-            let pair = (key.trim().to_owned(), value.trim().to_owned());
-            document.settings.push(pair);
-        }
-    };
-    let names: Vec<&str> = names.split('\t').map(str::trim).collect();
-    at_most(names.len(), MAX_CHANNELS, "columns")?;
-    let layout = Layout {
-        format: Format::Chiaro,
-        separator: Some('\t'),
-        decimal_comma: false,
-        columns: names.len(),
-    };
-    let lines = lines.map(|(_, line)| line);
-    let table = rows(
-        lines,
-        number_of_names + 2,
-        &layout,
-        &mut Budget::new(limits),
-    )?;
-    document.notes = table.notes;
+    let (names, columns) = headed(&text, &HEADING, &mut document)?;
     let named = names
         .iter()
-        .zip(table.columns)
+        .zip(columns)
         .filter(|(_, values)| !values.is_empty());
     let channels: Vec<Channel> = named
         .map(|(name, values)| {
@@ -61,10 +36,7 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
             Channel::new(name, unit, values)
         })
         .collect();
-    let setting = |key: &str| {
-        let found = document.settings.iter().find(|(name, _)| name == key);
-        found.and_then(|(_, value)| number(value))
-    };
+    let setting = |key: &str| document.setting(key).and_then(number);
     let mut curve = Curve::empty(0);
     curve.spring_constant = setting("k (N/m)").filter(|of| *of > 0.0);
     let [x, y] = ["X-position (um)", "Y-position (um)"].map(setting);

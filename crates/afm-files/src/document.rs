@@ -62,6 +62,20 @@ impl Document {
         }
     }
 
+    /// Keeps a line `name` separator `value` as a setting.
+    pub(crate) fn keep_setting(&mut self, line: &str, separator: &str) {
+        if let Some((name, value)) = line.split_once(separator) {
+            let setting = (name.trim().to_owned(), value.trim().to_owned());
+            self.settings.push(setting);
+        }
+    }
+
+    /// The value of a setting.
+    pub(crate) fn setting(&self, name: &str) -> Option<&str> {
+        let found = self.settings.iter().find(|(own, _)| own == name);
+        found.map(|(_, value)| value.as_str())
+    }
+
     /// How many curves the file has.
     pub fn curve_count(&self) -> usize {
         self.curves.count()

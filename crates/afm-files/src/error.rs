@@ -106,6 +106,14 @@ impl Format {
         self.damaged(Place::Byte(at as u64), problem, expected)
     }
 
+    /// The count of points along a side of an image, from the value of this key.
+    pub(crate) fn side(self, key: &str, value: Option<&str>) -> Result<usize, Error> {
+        let count = value.and_then(|of| of.parse::<usize>().ok());
+        count
+            .filter(|of| *of > 0)
+            .ok_or_else(|| self.at_key(key, "missing or not a count", "a whole number above 0"))
+    }
+
     /// Damage at a key of a header.
     pub(crate) fn at_key(
         self,

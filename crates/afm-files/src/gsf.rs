@@ -18,10 +18,7 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     at_most(end, MAX_HEADER, "bytes in a header")?;
     let mut document = Document::new(Format::Gsf, limits);
     for line in utf8_or_windows(&bytes[..end]).lines() {
-        if let Some((key, value)) = line.split_once('=') {
-            let pair = (key.trim().to_owned(), value.trim().to_owned());
-            document.settings.push(pair);
-        }
+        document.keep_setting(line, "=");
     }
     let text = |key: &str| {
         let found = document
@@ -30,14 +27,7 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
             .find(|(name, _)| name.eq_ignore_ascii_case(key));
         found.map(|(_, value)| value.as_str())
     };
-    let side = |key: &str| {
-        let found = text(key)
-            .and_then(|of| of.parse::<usize>().ok())
-            .filter(|of| *of > 0);
-        found.ok_or_else(|| {
-            Format::Gsf.at_key(key, "missing or not a count", "a whole number above 0")
-        })
-    };
+    let side = |key: &str| Format::Gsf.side(key, text(key));
     let shape = [side("XRes")?, side("YRes")?];
     let points = shape[0].saturating_mul(shape[1]);
     Budget::new(limits).numbers(points)?;

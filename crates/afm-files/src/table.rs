@@ -1,7 +1,8 @@
 //! Tables of numbers in text files.
 
+use crate::document::Document;
 use crate::error::Place;
-use crate::limits::{Budget, MAX_LINE, at_most};
+use crate::limits::{Budget, MAX_CHANNELS, MAX_HEADER, MAX_LINE, at_most};
 use crate::text::number;
 use crate::{Error, Format};
 
@@ -64,6 +65,59 @@ pub(crate) fn rows<'a>(
         }
     }
     Ok(table)
+}
+
+/// How settings and the head of the table below them are written.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heading {
+    /// Between the name and the value of a setting.
+    pub(crate) setting: &'static str,
+    /// How the line with the names of the columns begins.
+    pub(crate) begins: &'static [&'static str],
+    /// That line in errors.
+    pub(crate) shown: &'static str,
+    /// Between names and between numbers.
+    pub(crate) separator: char,
+}
+
+/// Reads settings into `document` and the table below them; returns the names of its columns and their
+/// numbers.
+pub(crate) fn headed<'a>(
+    text: &'a str,
+    heading: &Heading,
+    document: &mut Document,
+) -> Result<(Vec<&'a str>, Vec<Vec<f64>>), Error> {
+    let format = document.format;
+    let mut lines = text.lines().enumerate();
+    let mut length = 0;
+    let (number, names) = loop {
+        let (number, line) = lines
+            .next()
+            .ok_or_else(|| format.at_key(heading.shown, "no such line", "the head of a table"))?;
+        if heading.begins.iter().any(|of| line.starts_with(of)) {
+            break (number, line);
+        }
+        length += line.len();
+        at_most(length, MAX_HEADER, "bytes in a header")?;
+        document.keep_setting(line, heading.setting);
+    };
+    let names: Vec<&str> = names.split(heading.separator).map(str::trim).collect();
+    at_most(names.len(), MAX_CHANNELS, "columns")?;
+    let layout = Layout {
+        format,
+        separator: Some(heading.separator),
+        decimal_comma: false,
+        columns: names.len(),
+    };
+    let lines = lines.map(|(_, line)| line);
+    let table = rows(
+        lines,
+        number + 2,
+        &layout,
+        &mut Budget::new(document.limits),
+    )?;
+    document.notes = table.notes;
+    Ok((names, table.columns))
 }
 
 fn row(line: &str, layout: &Layout) -> Option<Vec<Option<f64>>> {

@@ -14,14 +14,11 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     let length = header.iter().map(|of| of.len()).sum();
     at_most(length, MAX_HEADER, "bytes in a header")?;
     for line in &header {
-        if let Some((key, value)) = line.trim_start_matches('#').split_once(": ") {
-            let pair = (key.trim().to_owned(), value.trim().to_owned());
-            document.settings.push(pair);
-        }
+        document.keep_setting(line.trim_start_matches('#'), ": ");
     }
     let quoted = |key: &str| -> Result<Vec<String>, Error> {
-        let found = document.settings.iter().find(|(name, _)| name == key);
-        let (_, list) =
+        let found = document.setting(key);
+        let list =
             found.ok_or_else(|| Format::JpkThermal.at_key(key, "missing", "names in quotes"))?;
         Ok(list
             .split('\'')

@@ -19,23 +19,10 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     let header = file.slice(0, length)?;
     let mut document = Document::new(Format::Wsxm, limits);
     for line in header.split(|of| *of == b'\n').map(utf8_or_windows) {
-        if let Some((key, value)) = line.split_once(':') {
-            let pair = (key.trim().to_owned(), value.trim().to_owned());
-            document.settings.push(pair);
-        }
+        document.keep_setting(&line, ":");
     }
-    let text = |key: &str| {
-        let found = document.settings.iter().find(|(name, _)| name == key);
-        found.map(|(_, value)| value.as_str())
-    };
-    let side = |key: &str| {
-        let found = text(key)
-            .and_then(|of| of.parse::<usize>().ok())
-            .filter(|of| *of > 0);
-        found.ok_or_else(|| {
-            Format::Wsxm.at_key(key, "missing or not a count", "a whole number above 0")
-        })
-    };
+    let text = |key: &str| document.setting(key);
+    let side = |key: &str| Format::Wsxm.side(key, text(key));
     let shape = [side("Number of columns")?, side("Number of rows")?];
     let kind = text("Image Data Type").unwrap_or("short");
     let number = match kind {

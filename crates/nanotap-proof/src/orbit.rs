@@ -637,10 +637,7 @@ impl<'a> Equations<'a> {
                     let regime = &self.system.regimes[leg.regime];
                     let start = self.system.phasors(at.phases[s]);
                     let here = regime.after((&at.states[s], &start), (since, &phasors));
-                    state = Some(match state {
-                        None => here,
-                        Some(other) => here.iter().zip(other).map(|(a, b)| a.hull(b)).collect(),
-                    });
+                    state = Some(hull(state, here));
                 }
             }
             all.push(state.ok_or(ProofError::Candidate {
@@ -688,6 +685,14 @@ impl<'a> Equations<'a> {
                 Ok(&saltation * &flown.propagator)
             })
             .collect()
+    }
+}
+
+/// The hull of a state and the others that are known already.
+pub(crate) fn hull(known: Option<Vec<Interval>>, here: Vec<Interval>) -> Vec<Interval> {
+    match known {
+        None => here,
+        Some(known) => here.iter().zip(known).map(|(a, b)| a.hull(b)).collect(),
     }
 }
 

@@ -13,7 +13,7 @@ use crate::ProofError;
 use crate::complex::Rectangle;
 use crate::interval::Interval;
 use crate::multipliers::Multipliers;
-use crate::orbit::{Candidate, Equations, Origin, Switch, Theorem, Unknowns};
+use crate::orbit::{Candidate, EnclosedSwitch, Equations, Origin, Switch, Theorem, Unknowns, hull};
 use crate::system::{Output, System};
 
 /// The rigid stop of a mass whose state is its position and velocity (x, v), in a system with one
@@ -74,6 +74,12 @@ pub fn prove_sticking(
     proved.or_else(|error| system.check_cancel().and(Err(error)))
 }
 
+/// All times from the earliest start in `time` to a `duration` after the latest.
+fn lasting(time: Interval, duration: f64) -> Interval {
+    let end = Interval::point(time.hi()) + Interval::point(duration);
+    Interval::new(time.lo(), end.hi())
+}
+
 struct Proof<'a> {
     system: &'a System,
     stop: &'a RigidStop,
@@ -113,10 +119,7 @@ impl Proof<'_> {
         let chatter = self
             .chatter(&impact.state, impact.time)
             .ok_or(ProofError::NoRest)?;
-        let since = Interval::new(
-            impact.time.lo(),
-            (Interval::point(impact.time.hi()) + Interval::point(chatter.duration)).hi(),
-        );
+        let since = lasting(impact.time, chatter.duration);
         let period = self.next_release(release, since)?;
         let states = (0..period)
             .map(|k| {
@@ -185,10 +188,7 @@ impl Proof<'_> {
             return None;
         }
         for _ in 0..ATTEMPTS {
-            let during = Interval::new(
-                time.lo(),
-                (Interval::point(time.hi()) + Interval::point(bounds.duration)).hi(),
-            );
+            let during = lasting(time, bounds.duration);
             let near = [
                 self.stop.place - Interval::new(0.0, bounds.distance),
                 Interval::around_zero(bounds.speed),
@@ -256,18 +256,13 @@ impl Proof<'_> {
         &self,
         periods: f64,
         enclosed: &Unknowns,
-        switches: &[crate::orbit::EnclosedSwitch],
+        switches: &[EnclosedSwitch],
         (since, chatter): (Interval, &Chatter),
     ) -> Vec<Interval> {
         let time = Interval::point(periods) * self.system.period;
         let phasors = self.system.phasors(Interval::ZERO);
         let mut state: Option<Vec<Interval>> = None;
-        let mut add = |here: Vec<Interval>| {
-            state = Some(match state.take() {
-                None => here,
-                Some(other) => here.iter().zip(other).map(|(a, b)| a.hull(b)).collect(),
-            });
-        };
+        let mut add = |here| state = Some(hull(state.take(), here));
         for (s, pair) in switches.windows(2).enumerate() {
             if time.hi() >= pair[0].time.lo() && time.lo() <= pair[1].time.hi() {
                 let start = self.system.phasors(enclosed.phases[s]);

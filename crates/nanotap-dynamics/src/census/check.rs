@@ -16,7 +16,7 @@ use crate::lyapunov::LyapunovSpectrum;
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::orbit::PeriodicOrbit;
-use crate::vector::mix;
+use crate::vector::{mix, unit};
 
 /// A start of a census that was followed again on the map itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -151,10 +151,7 @@ fn exact_outcome(kind: MotionKind, orbits: &[(usize, &PeriodicOrbit)]) -> ExactO
 fn neighbour(state: &[f64], seed: u64) -> Vec<f64> {
     let entries = state.iter().zip(0_u64..);
     entries
-        .map(|(x, k)| {
-            let drawn = mix(seed ^ mix(k)) as f64 / u64::MAX as f64;
-            x * (1.0 + NEIGHBOUR * (2.0 * drawn - 1.0))
-        })
+        .map(|(x, k)| x * (1.0 + NEIGHBOUR * (2.0 * unit(seed ^ mix(k)) - 1.0)))
         .collect()
 }
 

@@ -25,7 +25,7 @@ use pyo3::types::PyBytes;
 
 use crate::case::CaseCore;
 use crate::failure::Failure;
-use crate::study::json;
+use crate::study::{entry, json};
 use crate::watch::watched;
 
 /// A checked plan of a sweep or basin; its chunks are pure functions of it.
@@ -48,8 +48,7 @@ impl Recipe {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let entry = registry::study(name)
-            .ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
+        let entry = entry(name)?;
         let request = json(request)?;
         let studied = case.studied(py)?;
         let done = watched(py, progress, move |control| {

@@ -7,7 +7,7 @@ use nanotap::Error;
 use nanotap::frame::{Cell, Column, Frame};
 use nanotap::study::fit::Table;
 use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
-use nanotap::study::registry::{self, Answer, Document, Study as _};
+use nanotap::study::registry::{self, Answer, Document, Study as _, StudyEntry};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
 use nanotap_paper::{Options as PaperOptions, report_so_far, section_names};
@@ -32,8 +32,7 @@ pub(crate) fn study(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, String, bool)> {
-    let entry =
-        registry::study(name).ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
+    let entry = entry(name)?;
     let request = json(request)?;
     // Solved for once a case, not once a study.
     let case = if entry.any_distance {
@@ -64,7 +63,7 @@ fn shown_by(answer: &dyn Answer) -> Result<String, Error> {
             Cell::Number(number) => number.into(),
         };
         json!({
-            "name": name_of(frame, column),
+            "name": frame.name(column),
             "label": column.label,
             "unit": frame.unit(column.dimension),
             "values": (0..frame.rows).map(value).collect::<Vec<Value>>(),
@@ -75,7 +74,7 @@ fn shown_by(answer: &dyn Answer) -> Result<String, Error> {
         // A file may have a quantity twice, in two units; here it is in SI.
         let mut names = HashSet::new();
         let named = frame.columns.iter().filter(|c| !c.name.is_empty());
-        let once = named.filter(|c| names.insert(name_of(frame, c)));
+        let once = named.filter(|c| names.insert(frame.name(c)));
         let columns: Vec<Value> = once.map(|c| column(frame, c)).collect();
         json!({ "name": frame.name, "columns": columns })
     });
@@ -84,20 +83,16 @@ fn shown_by(answer: &dyn Answer) -> Result<String, Error> {
     Ok(json!({ "tables": tables, "figure": figure }).to_string())
 }
 
-/// The name of a column among quantities in SI, or in the model's units.
-fn name_of<'a>(frame: &Frame<'_>, column: &'a Column<'_>) -> &'a str {
-    if frame.is_si() {
-        &column.si_name
-    } else {
-        &column.name
-    }
+/// The study of this name.
+pub(crate) fn entry(name: &str) -> Result<&'static StudyEntry, Failure> {
+    registry::study(name).ok_or_else(|| Failure::input(format!("unknown study `{name}`")))
 }
 
 /// The studies: name, what each is about, what its progress counts, and the JSON schema of its
 /// request.
 #[pyfunction]
 pub(crate) fn studies() -> Vec<(&'static str, &'static str, &'static str, String)> {
-    let row = |entry: &registry::StudyEntry| {
+    let row = |entry: &StudyEntry| {
         let schema = (entry.request)().as_value().to_string();
         (entry.name, entry.about, entry.counted, schema)
     };
@@ -107,9 +102,7 @@ pub(crate) fn studies() -> Vec<(&'static str, &'static str, &'static str, String
 /// The JSON schema of a study's report, in which columns have `x-unit` and `x-label`.
 #[pyfunction]
 pub(crate) fn report_schema(name: &str) -> PyResult<String> {
-    let entry = registry::study(name);
-    let entry = entry.ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
-    Ok((entry.report)().as_value().to_string())
+    Ok((entry(name)?.report)().as_value().to_string())
 }
 
 /// A table of measured values from a CSV file, as JSON.

@@ -372,6 +372,15 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// The name of a column, among quantities in SI or in the model's units.
+    pub fn name<'c>(&self, column: &'c Column<'_>) -> &'c str {
+        if self.is_si() {
+            &column.si_name
+        } else {
+            &column.name
+        }
+    }
+
     /// The head of a column in tables that are read, with its unit where cells have none.
     pub fn head(&self, column: &Column<'_>) -> String {
         let head = &column.head;
@@ -391,9 +400,8 @@ impl<'a> Frame<'a> {
         let columns = self.columns.iter().filter(|c| !c.name.is_empty());
         let head =
             |c: &Column<'_>| match c.in_files.map_or(self.unit(c.dimension), |(_, unit)| unit) {
-                _ if !self.is_si() => c.name.to_string(),
-                "" => c.si_name.to_string(),
-                unit => format!("{} ({unit})", c.si_name),
+                unit if !self.is_si() || unit.is_empty() => self.name(c).to_owned(),
+                unit => format!("{} ({unit})", self.name(c)),
             };
         let mut csv = columns.clone().map(head).collect::<Vec<_>>().join(",") + "\n";
         for row in 0..self.rows {

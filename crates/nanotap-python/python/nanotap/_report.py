@@ -41,25 +41,16 @@ class Report(Record):
     @property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """All tables by name; `attrs` of each has the `units` and `labels` of its columns."""
-        import pandas as pd
-
-        def frame(columns: list[dict[str, Any]]) -> "pd.DataFrame":
-            table = pd.DataFrame({c["name"]: _values(c) for c in columns})
-            table.attrs["units"] = {c["name"]: c["unit"] for c in columns}
-            table.attrs["labels"] = {c["name"]: c["label"] for c in columns}
-            return table
-
-        return {name: frame(columns) for name, columns in self._columns().items()}
+        return {name: _frame(columns) for name, columns in self._columns().items()}
 
     def to_dataframe(self, name: str | None = None) -> "pd.DataFrame":
         """The table of this name, or the first one: the rows of the terminal's CSV file."""
-        tables = self.tables
-        if name is None:
-            return next(iter(tables.values()))
-        if name not in tables:
+        tables = self._columns()
+        chosen = next(iter(tables)) if name is None else name
+        if chosen not in tables:
             message = f"there is no table `{name}`; there are {', '.join(tables)}"
             raise KeyError(message)
-        return tables[name]
+        return _frame(tables[chosen])
 
     @property
     def ds(self) -> "xr.Dataset":
@@ -93,6 +84,16 @@ class Report(Record):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Report, (self.to_dict(), self._shown)
+
+
+def _frame(columns: list[dict[str, Any]]) -> "pd.DataFrame":
+    """Columns as a table, with their units and labels."""
+    import pandas as pd
+
+    table = pd.DataFrame({c["name"]: _values(c) for c in columns})
+    table.attrs["units"] = {c["name"]: c["unit"] for c in columns}
+    table.attrs["labels"] = {c["name"]: c["label"] for c in columns}
+    return table
 
 
 def _values(column: Mapping[str, Any]) -> list[Any]:

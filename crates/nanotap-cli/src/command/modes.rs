@@ -95,7 +95,7 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
     text
 }
 
-/// What is said, and listed, where not every mode oscillates.
+/// What is shown in place of frequencies where not every mode oscillates.
 fn without_frequencies(eigenvalues: Option<&[[f64; 2]]>, modes: usize) -> String {
     match eigenvalues {
         None => "  damped: eigenvalues too close to critical damping to distinguish\n".to_owned(),

@@ -25,7 +25,7 @@ pub struct ParameterEntry {
     pub range: Range,
     /// Key of a case that states the parameter.
     pub key: CaseKey,
-    /// Other keys, any of which states the parameter in place of its own.
+    /// Other keys from which the parameter can be computed instead.
     pub alternatives: Alternatives,
     /// Whether the default is an assumption about the sample that a case reports.
     pub assumed: bool,
@@ -65,7 +65,7 @@ pub struct KeyEntry {
     pub label: &'static str,
 }
 
-/// Keys that state a parameter in place of its own key.
+/// Keys from which a parameter can be computed where its own key is not given.
 #[derive(Clone, Copy, Debug)]
 pub struct Alternatives {
     /// Why only one of the keys may be stated.

@@ -117,8 +117,8 @@ const fn of_laws(key: &KeyEntry) -> Entry {
     }
 }
 
-/// The key that states a parameter of contact laws. It is evaluated while compiling: a parameter
-/// without a key of its own is an error there.
+/// The key that states a parameter of contact laws. It is evaluated while compiling, so that a
+/// parameter that has no key does not compile.
 const fn of_parameter(parameter: &ParameterEntry) -> Entry {
     match parameter.key {
         CaseKey::Own(key) => of_laws(&key),

@@ -14,6 +14,7 @@ mod dimension;
 mod format;
 mod kind;
 pub mod near_name;
+pub mod number;
 mod parser;
 mod units;
 

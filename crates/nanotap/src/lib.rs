@@ -6,27 +6,15 @@
 //! [`map`](mod@map) is for your own algorithms; a [`study`] runs and reports; a [`figure`] shows a
 //! report; a [`dataset`] keeps many motions on disk.
 
-#![cfg_attr(
-    test,
-    allow(
-        clippy::disallowed_methods,
-        reason = "references are the platform's own functions"
-    )
-)]
-
-pub mod case;
-pub mod dataset;
-pub mod error;
 pub mod figure;
-pub mod files;
-pub mod frame;
-pub mod input;
-pub mod map;
-pub mod model;
-pub mod number;
-pub mod observe;
 pub mod study;
 
-pub use error::{Error, ErrorKind};
-pub use map::Map;
+pub use nanotap_case::{self as case, input};
+pub use nanotap_dataset as dataset;
 pub use nanotap_dynamics::control;
+pub use nanotap_error::{self as error, Error, ErrorKind};
+pub use nanotap_fit::files;
+pub use nanotap_model as model;
+pub use nanotap_motions::{Map, map};
+pub use nanotap_observe::{self as observe, frame};
+pub use nanotap_quantity::number;

@@ -39,14 +39,17 @@ use nanotap_figures::Figure;
 use schemars::Schema;
 use serde_json::Value;
 
-use crate::Error;
-use crate::case::Case;
-use crate::dataset::Store;
-use crate::frame::Frame;
-use crate::study::request::{answer_schema, read, schema};
-use crate::study::setpoint::at_setpoint;
-pub use crate::study::{DatasetPlan, DatasetStudy};
-pub use crate::study::{Document, STUDIES, Study};
+pub use crate::study::STUDIES;
+use nanotap_case::Case;
+use nanotap_dataset::Store;
+use nanotap_error::Error;
+use nanotap_motions::setpoint::at_setpoint;
+use nanotap_observe::frame::Frame;
+pub use nanotap_study::DatasetPlan;
+pub use nanotap_study::DatasetStudy;
+pub use nanotap_study::Document;
+pub use nanotap_study::Study;
+use nanotap_study::request::{answer_schema, read, schema};
 
 /// An entry of the registry: a study from JSON to JSON.
 #[derive(Clone, Copy, Debug)]

@@ -16,6 +16,7 @@ mod kelvin_voigt;
 mod located_runge_kutta;
 mod map;
 mod motions;
+mod moving_gap;
 mod moving_surface;
 mod observables;
 mod orbit_derivatives;

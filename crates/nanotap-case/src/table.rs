@@ -1,0 +1,459 @@
+//! Tables of named columns, each with its unit, as a file or a program gives them.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value, json};
+
+use super::quantity::Quantity;
+use super::recording::{self, Recording};
+use crate::input::{self, MAX_TABLE_BYTES, Origin};
+use nanotap_error::Error;
+
+/// Most rows of a table.
+pub const MAX_ROWS: usize = 1_000_000;
+/// Most entries of a table, in all columns: 24 bytes of memory each.
+const MAX_ENTRIES: usize = 16_000_000;
+
+/// An entry of a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Entry {
+    /// An empty field, or a number that is NaN.
+    Missing,
+    /// A number in the unit of the column's header.
+    Number(f64),
+    /// A text that is not a number.
+    Text(String),
+}
+
+/// A table: columns of one length, each with its name and, in brackets, its unit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Name of the table for messages, such as the path of its file.
+    pub name: String,
+    /// Columns: the header as it was written, and the entries.
+    pub columns: Vec<(String, Vec<Entry>)>,
+    /// Line of each row in its file; empty if the table was not read from a file.
+    pub lines: Vec<u64>,
+    /// Notes on the measurement from the file of an instrument: name and text.
+    pub notes: Vec<(String, String)>,
+    /// What the reader of an instrument's file says of it, such as which height is the distance.
+    pub remarks: Vec<String>,
+}
+
+impl Table {
+    /// Reads the first curve of an instrument's file (all formats of `afm-files`) or a CSV file, in UTF-8, in
+    /// UTF-16 with a byte order mark, or in Latin-1. Fields of a CSV file are separated by commas, semicolons or
+    /// tabs, its first line names the columns, the next may contain their units, and lines that
+    /// begin with `#` are skipped. Where commas in numbers cannot be separators, they are decimal
+    /// commas, which `notes` states.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is not such a table; the message has line and column.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Self::read_from(path, Origin::User)
+    }
+
+    /// As [`read`](Self::read), of a file that the user or another file names.
+    pub(crate) fn read_from(path: &Path, origin: Origin) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let bytes = input::read(path, MAX_TABLE_BYTES, origin)?;
+        if recording::is_recording(&name, &bytes) {
+            let recorded = recording::parse(&name, bytes);
+            return recorded
+                .map(|recorded| Self::of_recording(&name, recorded))
+                .map_err(|error| {
+                    Error::input(
+                        format!("{name}: {error}"),
+                        "export the curve as text, with the names of the columns in the first line",
+                    )
+                });
+        }
+        let text = text_of(bytes).ok_or_else(|| {
+            Error::input(
+                format!("{name} is not a text (UTF-8, UTF-16 with a byte order mark, or Latin-1)"),
+                "export the curve as text, with the names of the columns in the first line",
+            )
+        })?;
+        Self::parse(&name, &text)
+    }
+
+    /// The table of an instrument's file.
+    pub(super) fn of_recording(name: &str, recorded: Recording) -> Self {
+        let column = |(header, numbers): (String, Vec<f64>)| {
+            (header, numbers.into_iter().map(Entry::Number).collect())
+        };
+        let mut columns: Vec<_> = recorded.columns.into_iter().map(column).collect();
+        if !recorded.directions.is_empty() {
+            let words = recorded.directions.into_iter();
+            let words = words.map(|word| Entry::Text(word.to_owned()));
+            columns.push(("direction".to_owned(), words.collect()));
+        }
+        Self {
+            name: name.to_owned(),
+            columns,
+            lines: Vec::new(),
+            notes: recorded.notes,
+            remarks: recorded.remarks,
+        }
+    }
+
+    /// Reads the text of such a file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
+        // The reader counts line feeds alone as lines.
+        let text = &if text.contains('\r') {
+            Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n"))
+        } else {
+            Cow::Borrowed(text)
+        };
+        let separator = delimiter(text);
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .delimiter(separator)
+            .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+        let refuse = |error: &csv::Error| {
+            let line = error.position().map_or(1, csv::Position::line);
+            let what = match error.kind() {
+                csv::ErrorKind::UnequalLengths {
+                    expected_len, len, ..
+                } => format!("{len} fields where the header names {expected_len} columns"),
+                _ => error.to_string(),
+            };
+            Error::input(
+                format!("{name}, line {line}: {what}"),
+                "give each row a field for every column, and separate columns by semicolons if \
+                 numbers have decimal commas",
+            )
+        };
+        let header = reader.headers().map_err(|error| refuse(&error))?.clone();
+        if header.is_empty() {
+            return Err(Error::input(
+                format!("{name} is empty"),
+                "give a table with the names of the columns in the first line",
+            ));
+        }
+        if header.iter().all(|word| decimal(word).is_some()) {
+            return Err(Error::input(
+                format!("{name} begins with numbers, without names of columns"),
+                "name the columns in the first line, each with its unit, as in `distance (nm)`",
+            ));
+        }
+        let mut records = Vec::new();
+        for record in reader.into_records() {
+            if (records.len() + 1) * header.len() > MAX_ENTRIES {
+                return Err(Error::input(
+                    format!("{name} has more than {MAX_ENTRIES} entries"),
+                    "keep fewer columns or rows",
+                ));
+            }
+            if records.len() == MAX_ROWS {
+                return Err(Error::input(
+                    format!("{name} has more than {MAX_ROWS} rows"),
+                    "keep fewer",
+                ));
+            }
+            records.push(record.map_err(|error| refuse(&error))?);
+        }
+        let has_units = records.first().is_some_and(is_units);
+        let unit_of = |column: usize| {
+            let units = records.first().filter(|_| has_units)?;
+            units.get(column).map(unit)
+        };
+        let named = header.iter().enumerate().map(|(column, word)| {
+            let own = Header::of(word).unit;
+            match unit_of(column).filter(|unit| own.is_empty() && !unit.is_empty()) {
+                Some(unit) => (format!("{word} ({unit})"), Vec::new()),
+                None => (word.to_owned(), Vec::new()),
+            }
+        });
+        let mut table = Self {
+            name: name.to_owned(),
+            columns: named.collect(),
+            ..Self::default()
+        };
+        let rows = &records[usize::from(has_units)..];
+        let has_commas = has_decimal_commas(rows, separator);
+        if has_commas {
+            let note = "numbers are read with decimal commas".to_owned();
+            table.notes.push((DECIMAL_COMMAS.to_owned(), note));
+        }
+        for record in rows {
+            let line = record.position().map_or(0, csv::Position::line);
+            table.lines.push(line);
+            for ((_, column), field) in table.columns.iter_mut().zip(record) {
+                let number = decimal(field).filter(|_| has_commas && field.contains(','));
+                column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
+            }
+        }
+        Ok(table)
+    }
+
+    /// The same table with its rows in reverse order.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let mut table = self.clone();
+        for (_, column) in &mut table.columns {
+            column.reverse();
+        }
+        table.lines.reverse();
+        table
+    }
+
+    /// Keeps the rows, by their index, for which `keeps` is true.
+    pub fn retain_rows(&mut self, keeps: impl Fn(usize) -> bool) {
+        let mut row = 0..;
+        self.lines.retain(|_| row.next().is_some_and(&keeps));
+        for (_, column) in &mut self.columns {
+            let mut row = 0..;
+            column.retain(|_| row.next().is_some_and(&keeps));
+        }
+    }
+
+    /// Returns the table if all columns have one length, which a program may get wrong.
+    ///
+    /// # Errors
+    /// If two columns have different lengths, or there are more than [`MAX_ROWS`] rows.
+    pub fn checked(self) -> Result<Self, Error> {
+        let lengths = || self.columns.iter().map(|(header, c)| (header, c.len()));
+        let mut pairs = lengths().zip(lengths().skip(1));
+        if let Some(((one, rows), (other, others))) = pairs.find(|((_, a), (_, b))| a != b) {
+            return Err(Error::input(
+                format!(
+                    "{}: column `{one}` has {rows} entries, column `{other}` has {others}",
+                    self.name
+                ),
+                "give all columns one length, with a missing value where nothing was measured",
+            ));
+        }
+        if self.rows() > MAX_ROWS {
+            return Err(Error::input(
+                format!("{} has more than {MAX_ROWS} rows", self.name),
+                "keep fewer",
+            ));
+        }
+        Ok(self)
+    }
+
+    /// Returns the number of rows: the length of the longest column.
+    pub fn rows(&self) -> usize {
+        self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)
+    }
+
+    /// Text for messages that names the place of an entry: table, line, column.
+    pub fn place(&self, row: Option<usize>, column: usize) -> String {
+        let header = self.columns.get(column).map_or("", |(header, _)| header);
+        let column = column + 1;
+        let line = match row {
+            None => Some(1),
+            Some(row) => self.lines.get(row).copied(),
+        };
+        match (line.filter(|_| !self.lines.is_empty()), row) {
+            (Some(line), _) => format!("{}, line {line}, column {column} `{header}`", self.name),
+            (None, Some(row)) => format!("{}, `{header}`, row {}", self.name, row + 1),
+            (None, None) => format!("{}, `{header}`", self.name),
+        }
+    }
+}
+
+/// Header of a column, split into name and unit.
+#[derive(Clone, Debug)]
+pub struct Header {
+    /// Name without the unit.
+    pub name: String,
+    /// Unit as written, empty if there is none.
+    pub unit: String,
+}
+
+impl Header {
+    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
+    pub fn of(written: &str) -> Self {
+        let written = written.trim();
+        let parts = [('(', ')'), ('[', ']')]
+            .into_iter()
+            .find_map(|(open, close)| {
+                let inner = written.strip_suffix(close)?;
+                let mut depth = 0;
+                let (place, _) = inner.char_indices().rev().find(|(_, c)| {
+                    let found = *c == open && depth == 0;
+                    depth += i32::from(*c == close) - i32::from(*c == open);
+                    found
+                })?;
+                Some((&inner[..place], &inner[place + 1..]))
+            });
+        let (name, unit) = parts.unwrap_or((written, ""));
+        Self {
+            name: name.trim().to_owned(),
+            unit: unit.trim().to_owned(),
+        }
+    }
+
+    /// Whether a column with the header `written` is called `name`, with or without its unit.
+    pub fn is_called(written: &str, name: &str) -> bool {
+        written == name || Self::of(written).name == name
+    }
+}
+
+impl Entry {
+    pub(crate) fn of(field: &str) -> Self {
+        match field.parse::<f64>() {
+            _ if field.is_empty() => Self::Missing,
+            Ok(number) if number.is_nan() => Self::Missing,
+            Ok(number) => Self::Number(number),
+            Err(_) => Self::Text(field.to_owned()),
+        }
+    }
+}
+
+/// Name of the note that numbers were read with decimal commas.
+pub const DECIMAL_COMMAS: &str = "DecimalCommas";
+
+/// The text in bytes of UTF-8, of UTF-16 with a byte order mark, or of Latin-1.
+fn text_of(bytes: Vec<u8>) -> Option<String> {
+    let wide = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes.as_chunks();
+        let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
+        String::from_utf16(&units).ok().filter(|_| rest.is_empty())
+    };
+    match &bytes[..] {
+        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
+        _ => String::from_utf8(bytes).map_or_else(|error| latin(error.as_bytes()), Some),
+    }
+}
+
+/// The text of Latin-1, in which a byte is a character, unless some are control characters.
+fn latin(bytes: &[u8]) -> Option<String> {
+    let is_text = |byte: &u8| b"\t\r\n".contains(byte) || !char::from(*byte).is_control();
+    let is_latin = bytes.iter().all(is_text);
+    is_latin.then(|| bytes.iter().map(|byte| char::from(*byte)).collect())
+}
+
+/// The number that a field contains, with a decimal point or a decimal comma.
+fn decimal(field: &str) -> Option<f64> {
+    field.replacen(',', ".", 1).parse().ok()
+}
+
+/// Whether commas in the numbers of these rows are decimal commas. They are not if another number
+/// has a decimal point, or if all of them may group thousands in a table whose separator is a comma.
+fn has_decimal_commas(rows: &[csv::StringRecord], separator: u8) -> bool {
+    let may_group = |field: &str| {
+        let unsigned = field.trim_start_matches(['-', '+']);
+        let (whole, part) = unsigned.split_once(',')?;
+        Some((1..=3).contains(&whole.len()) && !whole.starts_with('0') && part.len() == 3)
+    };
+    let has_point =
+        |field: &str| field.contains('.') && field.replace(',', "").parse::<f64>().is_ok();
+    let fields = || rows.iter().flatten();
+    let mut commas = fields()
+        .filter(|f| decimal(f).is_some())
+        .filter_map(may_group);
+    let is_decimal = if separator == b',' {
+        commas.any(|may_group| !may_group)
+    } else {
+        commas.next().is_some()
+    };
+    is_decimal && !fields().any(has_point)
+}
+
+/// A unit in the row under the header, without brackets.
+fn unit(field: &str) -> &str {
+    let inner = |open, close| field.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or(inner('(', ')')).unwrap_or(field).trim()
+}
+
+/// Whether a row contains units: no number, and at least one unit that is known.
+fn is_units(row: &csv::StringRecord) -> bool {
+    let is_known = |unit: &str| unit == "°" || format!("1 {unit}").parse::<Quantity>().is_ok();
+    let mut fields = row.iter().map(unit).filter(|field| !field.is_empty());
+    row.iter().all(|field| decimal(field).is_none()) && fields.any(is_known)
+}
+
+/// Separator of the fields: comma, semicolon or tab, whichever occurs most often in the header.
+fn delimiter(text: &str) -> u8 {
+    let header = text
+        .lines()
+        .find(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(|mark| count(*mark))
+        .unwrap_or(b',')
+}
+
+impl Serialize for Table {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let columns: Map<String, Value> = self
+            .columns
+            .iter()
+            .map(|(header, column)| (header.clone(), json!(column)))
+            .collect();
+        let mut table = json!({"name": self.name, "columns": columns});
+        if !self.notes.is_empty() {
+            let notes = self.notes.iter();
+            let notes: Map<String, Value> = notes.map(|(k, v)| (k.clone(), json!(v))).collect();
+            table["notes"] = json!(notes);
+        }
+        table.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Table {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Given {
+            #[serde(default)]
+            name: Option<String>,
+            columns: Map<String, Value>,
+            #[serde(default)]
+            notes: BTreeMap<String, String>,
+        }
+        let given = Given::deserialize(deserializer)?;
+        let column = |(header, values): (String, Value)| {
+            let entries = serde_json::from_value::<Vec<Entry>>(values)
+                .map_err(|_| D::Error::custom(format!("{header}: a list is needed")))?;
+            Ok((header, entries))
+        };
+        let columns = given.columns.into_iter().map(column);
+        let table = Self {
+            name: given.name.unwrap_or_else(|| "data".to_owned()),
+            columns: columns.collect::<Result<_, D::Error>>()?,
+            lines: Vec::new(),
+            notes: given.notes.into_iter().collect(),
+            remarks: Vec::new(),
+        };
+        table.checked().map_err(D::Error::custom)
+    }
+}
+
+impl JsonSchema for Table {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Table".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let column = json!({"type": "array", "items": {"type": ["number", "string", "null"]}});
+        json_schema!({
+            "type": "object",
+            "properties": {
+                "name": {"type": "string"},
+                "columns": {"type": "object", "additionalProperties": column},
+                "notes": {"type": "object", "additionalProperties": {"type": "string"}},
+            },
+            "required": ["columns"],
+        })
+    }
+}

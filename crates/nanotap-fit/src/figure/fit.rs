@@ -1,0 +1,262 @@
+//! The figure of a fit: measured curves, the fitted model, and the residuals.
+
+use nanotap_figures::{
+    Axis, Colour, DOUBLE_COLUMN, Figure, Heatmap, Legend, Line, Markers, Panel, Rule, category,
+};
+
+use crate::fit::{FitReport, FittedColumn, FittedRow, Reading};
+use nanotap_case::Key;
+use nanotap_case::physical::Kind;
+use nanotap_case::units::prefixed;
+use nanotap_dataset::{Store, StoreError};
+use nanotap_motions::approach::Way;
+use nanotap_motions::figure::shown::Shown;
+use nanotap_motions::frequency_modulation::Modulated;
+use nanotap_observe::frame::Row as _;
+use nanotap_observe::table::shown_phase;
+
+/// Number of panels side by side.
+const ACROSS: usize = 3;
+
+/// A map of each fitted parameter of a force volume; of a single row of pixels, its values.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+pub fn fit_map_figure(store: &Store) -> Result<Figure, StoreError> {
+    store.require_all()?;
+    let schema = store.schema();
+    let axes = &schema.grid.axes;
+    let mapped: Vec<usize> = (0..schema.variables.len())
+        .filter(|k| {
+            let error = format!("{}_error", schema.variables[*k].name);
+            schema.index_of(&error).is_some()
+        })
+        .collect();
+    let across = mapped.len().clamp(1, 2);
+    let down = mapped.len().div_ceil(across).max(1);
+    let mut figure = Figure::new(down, across)
+        .width(DOUBLE_COLUMN)
+        .height(80.0 * down as f64);
+    for k in mapped {
+        let mut values = Vec::new();
+        for chunk in 0..store.chunks() {
+            values.extend(store.read_chunk(&schema.grid.block(chunk), k)?.numbers());
+        }
+        let size = values.iter().fold(
+            0.0,
+            |m: f64, v| if v.is_finite() { m.max(v.abs()) } else { m },
+        );
+        let name = &schema.variables[k].name;
+        let kind = Key::find(name).map(Key::kind);
+        let unit = schema.variables[k].attributes.get("units");
+        let unit = unit.and_then(|unit| unit.as_str()).unwrap_or("1");
+        let kind = kind.or_else(|| (unit == "m").then_some(Kind::Length));
+        let (factor, unit) = match kind {
+            Some(kind) if kind != Kind::Number => prefixed(kind, 1.0, size),
+            _ => (1.0, unit.to_owned()),
+        };
+        let title = match unit.as_str() {
+            "1" | "" => name.clone(),
+            unit => format!("{name} ({unit})"),
+        };
+        let axis = |k: usize| {
+            let axis = &axes[k];
+            let unit = schema
+                .coordinate(&axis.name)
+                .and_then(|c| c.attributes.get("units"));
+            match unit.and_then(|unit| unit.as_str()).unwrap_or("1") {
+                "1" => Axis::linear(&axis.name),
+                unit => Axis::linear(format!("{} ({unit})", axis.name)),
+            }
+        };
+        let scaled = values.iter().map(|value| factor * value);
+        let [rows, columns] = match axes.len() {
+            1 => [1, axes[0].length],
+            _ => [axes[0].length, axes[1].length],
+        };
+        figure = figure.with(if rows == 1 {
+            let positions = schema.axis_values(axes.len() - 1);
+            let points = positions.into_iter().zip(scaled);
+            Panel::new(axis(axes.len() - 1), Axis::linear(title))
+                .with(Markers::new(points).colour(Colour::BLUE))
+        } else {
+            let edges = |k: usize| {
+                let at = schema.axis_values(k);
+                let (first, last) = (at[0], at[at.len() - 1]);
+                let half = 0.5 * (last - first) / (at.len() - 1).max(1) as f64;
+                (first - half, last + half)
+            };
+            Panel::new(axis(1).tight(), axis(0).tight()).with(Heatmap::new(
+                columns,
+                rows,
+                scaled,
+                edges(1),
+                edges(0),
+                Axis::linear(title),
+            ))
+        });
+    }
+    Ok(figure)
+}
+
+/// Each measured quantity with the fit and the other stable orbits, and below it the residuals in
+/// standard errors.
+pub fn fit_figure(report: &FitReport) -> Figure {
+    let across = report.columns.len().clamp(1, ACROSS);
+    let blocks = report.columns.len().div_ceil(across).max(1);
+    let heights = (0..blocks).flat_map(|_| [2.2, 1.0]);
+    let mut figure = Figure::new(2 * blocks, across)
+        .width(DOUBLE_COLUMN)
+        .height(88.0 * blocks as f64)
+        .row_heights(heights)
+        .share_x();
+    for block in report.columns.chunks(across) {
+        for (index, column) in block.iter().enumerate() {
+            let first = index == 0 && std::ptr::eq(block, &raw const report.columns[..across]);
+            let legend = if first { Legend::Above } else { Legend::Hidden };
+            figure = figure.with(readings(report, column).legend(legend));
+        }
+        for _ in block.len()..across {
+            figure = figure.with(Panel::new(Axis::linear(""), Axis::linear("")));
+        }
+        for column in block {
+            figure = figure.with(residuals(report, column));
+        }
+        for _ in block.len()..across {
+            figure = figure.with(Panel::new(Axis::linear(""), Axis::linear("")));
+        }
+    }
+    figure
+}
+
+/// The axis of the swept quantity, and the factor of its values.
+fn swept(report: &FitReport) -> (Axis, f64) {
+    let key = Key::all().find(|key| key.path() == report.swept);
+    let size = report.rows.iter().map(|r| r.at.abs()).fold(0.0, f64::max);
+    let symbol = key.map_or_else(|| report.swept.clone(), Key::label);
+    match key.filter(|key| key.is_physical()).map(Key::kind) {
+        Some(kind) if kind != Kind::Number => {
+            let (factor, unit) = prefixed(kind, 1.0, size);
+            (Axis::linear(format!("{symbol} ({unit})")), factor)
+        }
+        _ => (Axis::linear(symbol), 1.0),
+    }
+}
+
+/// Rows in one colour: name, colour and indices.
+fn groups(report: &FitReport) -> Vec<(String, Colour, Vec<&FittedRow>)> {
+    let mut names: Vec<(String, Option<Way>)> = Vec::new();
+    for row in &report.rows {
+        let name = (row.curve.clone(), row.way);
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let one_curve = names.iter().all(|(curve, _)| *curve == names[0].0);
+    let named = |(index, (curve, way)): (usize, &(String, Option<Way>))| {
+        let name = match way {
+            Some(way) if one_curve => way.name().to_owned(),
+            Some(way) => format!("{curve}, {}", way.name()),
+            None if one_curve => "data".to_owned(),
+            None => curve.clone(),
+        };
+        let colour = match index {
+            0 => Colour::BLUE,
+            1 => Colour::VERMILLION,
+            more => category(more),
+        };
+        let of = |row: &&FittedRow| row.curve == *curve && row.way == *way;
+        (name, colour, report.rows.iter().filter(of).collect())
+    };
+    names.iter().enumerate().map(named).collect()
+}
+
+fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
+    let (x, along) = swept(report);
+    let shown = Shown::named(&column.observable);
+    let phase = shown.is_some_and(Shown::is_phase);
+    let physical = report
+        .rows
+        .iter()
+        .filter_map(|r| r.readings.get(&column.name));
+    let size = physical
+        .filter_map(|reading| reading.measured)
+        .fold(0.0, |size: f64, value| size.max(value.abs()));
+    let si = |_| (column.unit != "1" && Key::find(&report.swept).is_some()).then_some(1.0);
+    let modulated = Modulated::COLUMNS
+        .iter()
+        .find(|c| c.name == column.observable);
+    let name = modulated.map_or(column.name.as_str(), |c| c.label);
+    let kind = modulated.map_or_else(|| Kind::of_si_unit(&column.unit), |c| c.dimension.kind());
+    let (label, factor) = match (shown, kind) {
+        (Some(shown), _) => shown.axis(true, si, size),
+        (None, Some(kind)) if column.unit != "1" => {
+            let (factor, unit) = prefixed(kind, 1.0, size);
+            (format!("{name} ({unit})"), factor)
+        }
+        (None, _) => (name.to_owned(), 1.0),
+    };
+    let y = |value: f64| factor * if phase { shown_phase(value) } else { value };
+    let points = |rows: &[&FittedRow], of: fn(&Reading) -> Option<f64>| -> Vec<(f64, f64)> {
+        let point = |row: &&FittedRow| {
+            let value = of(row.readings.get(&column.name)?)?;
+            Some((along * row.at, y(value)))
+        };
+        rows.iter().filter_map(point).collect()
+    };
+    let mut panel = Panel::new(x, Axis::linear(label));
+    for (index, jump) in report.jumps.iter().enumerate() {
+        let fold = Rule::vertical(along * jump.fold);
+        // One entry of the legend for all.
+        panel = panel.with(if index == 0 {
+            fold.label("folds of the fit")
+        } else {
+            fold
+        });
+    }
+    let others: Vec<(f64, f64)> = report
+        .others
+        .iter()
+        .filter_map(|other| Some((along * other.at, y(*other.readings.get(&column.name)?))))
+        .collect();
+    if !others.is_empty() {
+        let other = Markers::new(others).colour(Colour::GREY).size(0.5);
+        panel = panel.with(other.label("other stable motions"));
+    }
+    for (name, colour, rows) in groups(report) {
+        let measured = Markers::new(points(&rows, |reading| reading.measured))
+            .colour(colour)
+            .open()
+            .size(1.1);
+        panel = panel.with(measured.label(name));
+    }
+    let mut lines: Vec<(f64, f64)> = Vec::new();
+    for (_, _, rows) in groups(report) {
+        for run in rows.chunk_by(|a, b| a.branch == b.branch) {
+            lines.extend(points(run, |reading| reading.model));
+            lines.push((f64::NAN, f64::NAN));
+        }
+    }
+    panel.with(
+        Line::new(lines)
+            .colour(Colour::BLACK)
+            .width(0.8)
+            .label("fit"),
+    )
+}
+
+fn residuals(report: &FitReport, column: &FittedColumn) -> Panel {
+    let (x, along) = swept(report);
+    let mut panel = Panel::new(x, Axis::linear("residual / $σ$"))
+        .legend(Legend::Hidden)
+        .with(Rule::horizontal(0.0));
+    for (_, colour, rows) in groups(report) {
+        let point = |row: &&FittedRow| {
+            let residual = row.readings.get(&column.name)?.residual?;
+            Some((along * row.at, residual))
+        };
+        let points: Vec<(f64, f64)> = rows.iter().filter_map(point).collect();
+        panel = panel.with(Markers::new(points).colour(colour).open().size(0.9));
+    }
+    panel
+}

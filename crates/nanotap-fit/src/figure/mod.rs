@@ -1,0 +1,5 @@
+//! The figures of these studies.
+
+pub mod files;
+pub mod fit;
+pub mod reconstruct;

@@ -1,0 +1,499 @@
+//! Fits of a map of curves: a force volume, one fit a pixel, into a dataset.
+//!
+//! The rows of the data name their pixel in further columns. Pixels of a chunk are fitted in
+//! sequence, each from the result of the one before; where that does not describe the data, from every
+//! initial value again, as a single curve. The result does not depend on threads.
+
+use std::collections::BTreeMap;
+
+use nanotap_dynamics::Control;
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::json;
+
+use super::{FitOptions, FitReport, FitStudy, fit, names};
+use crate::figure::fit::fit_map_figure;
+use nanotap_case::Case;
+use nanotap_case::table::{Entry, Header, Table};
+use nanotap_dataset::schema::Kind;
+use nanotap_dataset::{
+    Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
+    attributes, chunk_files, work,
+};
+use nanotap_error::Error;
+use nanotap_figures::Figure;
+use nanotap_study::Computation;
+use nanotap_study::DatasetPlan;
+use nanotap_study::DatasetStudy;
+use nanotap_study::Study as _;
+
+/// Largest number of pixels of a map.
+const MAX_PIXELS: usize = 1 << 18;
+/// Number of first pixels in which a fit is searched for that determines the parameters and their
+/// units.
+const FIRST: usize = 8;
+/// Chunks of a map with one axis.
+const CHUNKS: usize = 64;
+
+/// Results of a pixel, by code: the curve is described; the residuals are not noise, or nothing
+/// describes the curve; there is no result.
+const RESULTS: [&str; 3] = ["fits", "misfit", "failed"];
+
+/// Name of the variable with the code of the result.
+const RESULT: &str = "result";
+
+/// Fits of a map of curves ([`FitOptions::pixels`]).
+#[derive(Clone, Copy, Debug)]
+pub struct FitMap;
+
+impl DatasetStudy for FitMap {
+    const NAME: &'static str = FitStudy::NAME;
+    const ABOUT: &'static str = FitStudy::ABOUT;
+    const COUNTED: &'static str = "rows of pixels";
+    const PLANNED: &'static str = "starts";
+    type Options = FitOptions;
+    type Report = FitMapReport;
+
+    fn solves_distance(_: &FitOptions) -> bool {
+        true
+    }
+
+    fn prepare(
+        case: &Case,
+        options: &FitOptions,
+        control: &Control<'_>,
+    ) -> Result<DatasetPlan, Error> {
+        Ok(Box::new(Map::new(case, options, control)?))
+    }
+
+    fn report(store: &Store) -> Result<FitMapReport, StoreError> {
+        FitMapReport::of(store)
+    }
+
+    fn figure(store: &Store) -> Result<Figure, StoreError> {
+        fit_map_figure(store)
+    }
+}
+
+/// Summary of a map of fits.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct FitMapReport {
+    /// Number of pixels with data.
+    pub pixels: usize,
+    /// Number of pixels whose curve is described.
+    pub fits: usize,
+    /// Number of pixels whose curve is not described: the residuals of the best values are not
+    /// noise.
+    pub misfits: usize,
+    /// Number of pixels for which the fit has no result.
+    pub failed: usize,
+    /// The free parameters, each over the pixels whose curve is described.
+    pub parameters: Vec<MappedParameter>,
+}
+
+/// Median and range of a parameter over a map.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MappedParameter {
+    /// Name of the parameter, as in the report of a fit.
+    pub key: String,
+    /// Unit of the values in SI, `1` if there is none.
+    pub unit: String,
+    /// Median over the pixels whose curve is described, in `unit`; None if there are none.
+    pub median: Option<f64>,
+    /// Quantiles of 5 % and 95 % over these pixels, in `unit`.
+    pub range: [Option<f64>; 2],
+    /// Median of the standard errors over these pixels, in `unit`; None if no pixel has one.
+    pub standard_error: Option<f64>,
+}
+
+impl FitMapReport {
+    fn of(store: &Store) -> Result<Self, StoreError> {
+        store.require_all()?;
+        let schema = store.schema();
+        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); schema.variables.len()];
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            for (k, column) in columns.iter_mut().enumerate() {
+                column.extend(store.read_chunk(&block, k)?.numbers());
+            }
+        }
+        let column = |name: &str| schema.index_of(name).map(|k| &columns[k][..]);
+        let results = column(RESULT).unwrap_or_default();
+        let count = |code: f64| results.iter().filter(|result| **result == code).count();
+        let parameters = schema.variables.iter().filter_map(|variable| {
+            let errors = column(&error_of(&variable.name))?;
+            let fitted = |values: &[f64]| -> Vec<f64> {
+                let both = values.iter().zip(results);
+                let kept = both.filter(|(value, result)| value.is_finite() && **result == 1.0);
+                let mut kept: Vec<f64> = kept.map(|(value, _)| *value).collect();
+                kept.sort_by(f64::total_cmp);
+                kept
+            };
+            let values = fitted(column(&variable.name)?);
+            let unit = variable.attributes.get("units");
+            Some(MappedParameter {
+                key: variable.name.clone(),
+                unit: unit
+                    .and_then(|unit| unit.as_str())
+                    .unwrap_or("1")
+                    .to_owned(),
+                median: quantile(&values, 0.5),
+                range: [0.05, 0.95].map(|part| quantile(&values, part)),
+                standard_error: quantile(&fitted(errors), 0.5),
+            })
+        });
+        Ok(Self {
+            pixels: results.iter().filter(|result| **result != 0.0).count(),
+            fits: count(1.0),
+            misfits: count(2.0),
+            failed: count(3.0),
+            parameters: parameters.collect(),
+        })
+    }
+}
+
+fn quantile(sorted: &[f64], part: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    sorted.get((part * last as f64).round() as usize).copied()
+}
+
+fn error_of(key: &str) -> String {
+    format!("{key}_error")
+}
+
+/// An axis of pixels: the numbers in a column of the data.
+#[derive(Debug)]
+struct Pixels {
+    name: String,
+    unit: String,
+    values: Vec<f64>,
+}
+
+/// A map that is prepared, ready to be fitted chunk by chunk.
+#[derive(Debug)]
+struct Map {
+    case: Case,
+    /// Options of the fit of one pixel; data and pixels are empty.
+    options: FitOptions,
+    table: Table,
+    /// Rows of the table of each pixel, by the number of its entry in the grid.
+    rows: BTreeMap<usize, Vec<usize>>,
+    parameters: Vec<String>,
+    /// Whether the rows of the first pixel are in the other order.
+    turned: bool,
+    schema: Schema,
+}
+
+impl Map {
+    fn new(case: &Case, options: &FitOptions, control: &Control<'_>) -> Result<Self, Error> {
+        let pixels = names(&options.pixels);
+        if !(1..=2).contains(&pixels.len()) {
+            return Err(Error::option(
+                "pixels",
+                format!("expected one or two columns, got {}", pixels.len()),
+                "name the columns that tell the pixel, as in x,y",
+            ));
+        }
+        if !options.per_curve.is_empty() || !options.laws.is_empty() {
+            return Err(Error::option(
+                "pixels",
+                "every pixel is a fit of one curve under one law",
+                "leave {per_curve} and {laws} out",
+            ));
+        }
+        let [table] = &options.data[..] else {
+            return Err(Error::option(
+                "data",
+                format!("a map is one table, got {}", options.data.len()),
+                "put all pixels into one table",
+            ));
+        };
+        let mut table = table.clone();
+        // The last column named changes slowest.
+        let axes = pixels.iter().rev().map(|name| taken(&mut table, name));
+        let (axes, columns): (Vec<Pixels>, Vec<Vec<usize>>) =
+            axes.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
+        let count: usize = axes.iter().map(|axis| axis.values.len()).product();
+        if count > MAX_PIXELS {
+            return Err(Error::option(
+                "pixels",
+                format!("{count} pixels are too many; {MAX_PIXELS} at most"),
+                "fit a part of the map",
+            ));
+        }
+        let mut rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for row in 0..table.rows() {
+            let entry = axes.iter().zip(&columns);
+            let entry = entry.fold(0, |flat, (axis, at)| flat * axis.values.len() + at[row]);
+            rows.entry(entry).or_default().push(row);
+        }
+        let options = FitOptions {
+            data: Vec::new(),
+            pixels: Vec::new(),
+            profile: false,
+            ..options.clone()
+        };
+        let mut map = Self {
+            case: case.clone(),
+            options,
+            table,
+            rows,
+            parameters: Vec::new(),
+            turned: false,
+            schema: Schema {
+                grid: Grid { axes: Vec::new() },
+                variables: Vec::new(),
+                coordinates: Vec::new(),
+                attributes: attributes::of_case("map of fits", FitStudy::NAME, case),
+            },
+        };
+        let first = map.first(control)?;
+        map.turned = first.turned;
+        map.parameters = first.parameters.iter().map(|p| p.key.clone()).collect();
+        map.describe(&first, axes);
+        Ok(map)
+    }
+
+    /// A fit of one of the first pixels.
+    fn first(&self, control: &Control<'_>) -> Result<FitReport, Error> {
+        let quiet = Control {
+            progress: None,
+            ..*control
+        };
+        let mut refused = None;
+        for rows in self.rows.values().take(FIRST) {
+            match self.fitted(rows, None, &quiet) {
+                Ok(report) => return Ok(report),
+                Err(error) if control.is_cancelled() => return Err(error),
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        Err(refused.unwrap_or_else(|| Error::option("data", "the table has no rows", "give rows")))
+    }
+
+    /// The fit of a pixel, from the result of another if one is given.
+    fn fitted(
+        &self,
+        rows: &[usize],
+        before: Option<&FitReport>,
+        control: &Control<'_>,
+    ) -> Result<FitReport, Error> {
+        let columns = self.table.columns.iter().map(|(header, column)| {
+            let own = rows.iter().filter_map(|row| column.get(*row).cloned());
+            (header.clone(), own.collect())
+        });
+        let lines = rows.iter().filter_map(|row| self.table.lines.get(*row));
+        let table = Table {
+            name: self.table.name.clone(),
+            columns: columns.collect(),
+            lines: lines.copied().collect(),
+            notes: self.table.notes.clone(),
+            remarks: Vec::new(),
+        };
+        let turned = before.map_or(self.turned, |before| before.turned);
+        let mut options = FitOptions {
+            data: vec![if turned { table.reversed() } else { table }],
+            ..self.options.clone()
+        };
+        if let Some(before) = before {
+            options.starts = 1;
+            let known = |key: &str| {
+                let own = options.start.iter().filter_map(|text| text.split_once('='));
+                own.into_iter().any(|(name, _)| name.trim() == key)
+            };
+            let further = before.parameters.iter().filter(|p| !known(&p.key));
+            let further = further.map(|p| match p.unit.as_str() {
+                "1" => format!("{}={}", p.key, p.value),
+                unit => format!("{}={} {unit}", p.key, p.value),
+            });
+            let further: Vec<String> = further.collect();
+            options.start.extend(further);
+        }
+        let mut found = fit(&self.case, &options, control)?;
+        found.turned ^= turned;
+        Ok(found)
+    }
+
+    /// Grid, variables and coordinates, once the parameters are known.
+    fn describe(&mut self, first: &FitReport, axes: Vec<Pixels>) {
+        let real =
+            |name: &str, about: &str, unit: &str| Variable::new(name, Kind::Real, about, unit);
+        let variables = &mut self.schema.variables;
+        for parameter in &first.parameters {
+            let (key, unit) = (&parameter.key, &parameter.unit);
+            variables.push(real(key, &format!("best value of {key}"), unit));
+            variables.push(real(
+                &error_of(key),
+                &format!("standard error of {key}"),
+                unit,
+            ));
+        }
+        variables.push(real(
+            "chi2_reduced",
+            "chi2 over the degrees of freedom",
+            "1",
+        ));
+        let codes: Vec<usize> = (0..=RESULTS.len()).collect();
+        variables.push(
+            Variable::new(RESULT, Kind::Code, "whether the curve is described", "1")
+                .attribute("flag_values", json!(codes))
+                .attribute("flag_meanings", format!("missing {}", RESULTS.join(" "))),
+        );
+        let attributes = &mut self.schema.attributes;
+        attributes.insert("options".into(), attributes::text(&self.options));
+        attributes.insert("data".into(), attributes::text(&fingerprint(&self.table)));
+        let last = axes.len() - 1;
+        for (k, axis) in axes.into_iter().enumerate() {
+            let length = axis.values.len();
+            let chunk = match (k, last) {
+                (0, 0) => length.div_ceil(CHUNKS),
+                (0, _) => 1,
+                _ => length,
+            };
+            self.schema
+                .grid
+                .axes
+                .push(Axis::new(&axis.name, length, chunk));
+            let about = "pixel";
+            let values = Values::Real(axis.values);
+            let coordinate = Coordinate::of(&axis.name, values, about, &axis.unit);
+            self.schema.coordinates.push(coordinate);
+        }
+    }
+
+    /// The values of the pixels of a chunk, by variable; none if the work was cancelled.
+    fn chunk(&self, block: &Block, control: &Control<'_>) -> Option<Vec<Values>> {
+        let quiet = Control {
+            progress: None,
+            ..*control
+        };
+        let count = 2 * self.parameters.len() + 2;
+        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); count];
+        let mut before: Option<FitReport> = None;
+        let axes = &self.schema.grid.axes;
+        for entry in block.entries() {
+            let entry = entry.iter().zip(axes);
+            let entry = entry.fold(0, |flat, (at, axis)| flat * axis.length + at);
+            let mut values = vec![f64::NAN; count];
+            values[count - 1] = 0.0;
+            if let Some(rows) = self.rows.get(&entry) {
+                let near = before
+                    .as_ref()
+                    .map(|near| self.fitted(rows, Some(near), &quiet));
+                let report = match near {
+                    Some(Ok(report)) if report.fits && !report.misfit => Ok(report),
+                    _ => self.fitted(rows, None, &quiet),
+                };
+                if quiet.is_cancelled() {
+                    return None;
+                }
+                values[count - 1] = 3.0;
+                if let Ok(report) = report {
+                    let of = |key: &String| report.parameters.iter().find(|p| p.key == *key);
+                    for (k, parameter) in self.parameters.iter().map(of).enumerate() {
+                        values[2 * k] = parameter.map_or(f64::NAN, |p| p.value);
+                        let error = parameter.and_then(|p| p.standard_error);
+                        values[2 * k + 1] = error.unwrap_or(f64::NAN);
+                    }
+                    values[count - 2] = report.chi2 / report.degrees_of_freedom.max(1) as f64;
+                    let fits = report.fits && !report.misfit;
+                    values[count - 1] = if fits { 1.0 } else { 2.0 };
+                    if fits {
+                        before = Some(report);
+                    }
+                }
+            }
+            for (column, value) in columns.iter_mut().zip(values) {
+                column.push(value);
+            }
+        }
+        let last = columns.pop()?;
+        let mut values: Vec<Values> = columns.into_iter().map(Values::Real).collect();
+        values.push(Values::Code(last.iter().map(|code| *code as u8).collect()));
+        Some(values)
+    }
+}
+
+impl Computation for Map {
+    fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
+        work(
+            store,
+            how,
+            |_| 1,
+            |block, _| self.chunk(block, &how.control),
+            |_, columns| columns.into_iter().next().unwrap_or_default(),
+        )
+    }
+
+    fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
+        let grid = &self.schema.grid;
+        let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
+        let columns = self.chunk(&block, control)?;
+        Some(chunk_files(&self.schema, &block, &columns))
+    }
+}
+
+/// Takes the column of a pixel axis out of a table: its different values, and the number of that of
+/// each row.
+fn taken(table: &mut Table, name: &str) -> Result<(Pixels, Vec<usize>), Error> {
+    let named = |(header, _): &(String, Vec<Entry>)| Header::of(header).name == name;
+    let index = table.columns.iter().position(named).ok_or_else(|| {
+        let all = table
+            .columns
+            .iter()
+            .map(|(header, _)| Header::of(header).name);
+        Error::option(
+            "pixels",
+            format!("{} has no column `{name}`", table.name),
+            format!(
+                "name one of its columns: {}",
+                all.collect::<Vec<_>>().join(", ")
+            ),
+        )
+    })?;
+    let (header, column) = table.columns.remove(index);
+    let number = |(row, entry): (usize, &Entry)| match entry {
+        Entry::Number(value) if value.is_finite() => Ok(*value),
+        _ => Err(Error::option(
+            "pixels",
+            format!(
+                "{}, `{header}`, row {}: expected a number",
+                table.name,
+                row + 1
+            ),
+            "give every row the numbers of its pixel",
+        )),
+    };
+    let numbers: Result<Vec<f64>, Error> = column.iter().enumerate().map(number).collect();
+    let numbers = numbers?;
+    let mut values = numbers.clone();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    let place = |value: &f64| values.partition_point(|other| other < value);
+    let places = numbers.iter().map(place).collect();
+    let Header { name, unit } = Header::of(&header);
+    let unit = if unit.is_empty() {
+        "1".to_owned()
+    } else {
+        unit
+    };
+    let pixels = Pixels { name, unit, values };
+    Ok((pixels, places))
+}
+
+/// Returns numbers that distinguish a table from others: its columns, and the sum of the numbers of
+/// each.
+fn fingerprint(table: &Table) -> BTreeMap<String, f64> {
+    let number = |entry: &Entry| match entry {
+        Entry::Number(value) => *value,
+        _ => 0.0,
+    };
+    let columns = table.columns.iter();
+    columns
+        .map(|(header, column)| (header.clone(), column.iter().map(number).sum()))
+        .collect()
+}

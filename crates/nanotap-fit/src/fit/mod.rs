@@ -1,0 +1,377 @@
+//! Parameters from measured curves: stiffness, damping, distance and calibration for which the
+//! model reproduces the data.
+//!
+//! Each row of the data is a position (a distance, a drive frequency, any key of the case) at which
+//! a periodic orbit was observed. The curve determines which of the coexisting orbits it is
+//! (`branches.rs`). The derivatives of the observables with respect to every free parameter are
+//! exact, by the implicit function theorem ([`Derivative`](nanotap_observe::Derivative)), and the
+//! Levenberg–Marquardt method finds the minimum (`solve.rs`).
+//!
+//! The first fit is rough: residuals are relative to the spread of their column, large ones count
+//! by their logarithm, and the fit starts from the values of the case and, if these do not describe
+//! the data, from others. Then the branches are assigned again and the fit is repeated in standard
+//! errors, until the branches no longer change. Unknown standard errors are estimated from the
+//! residuals.
+//!
+//! A curve under frequency modulation consists of orbits with given amplitude and phase; frequency
+//! and strength of the drive are unknowns (`problem/held.rs`).
+//!
+//! A force curve is one of rests of the lever: neither its drive nor its motion counts
+//! (`problem/rest.rs`).
+//!
+//! Fails by stopping in a local minimum (`fits` is false then, as a warning), and where the data
+//! belong to a motion that is not periodic.
+
+mod baseline;
+mod branches;
+mod data;
+mod guess;
+pub(crate) mod instrument;
+mod jumps;
+mod laws;
+mod map;
+mod parameters;
+mod problem;
+mod profile;
+mod quantity;
+mod report;
+mod reporting;
+mod search;
+mod solve;
+mod statistics;
+pub(crate) mod thin;
+
+use nanotap_dynamics::Control;
+
+use crate::figure::fit::fit_figure;
+pub(crate) use data::is_distance;
+pub use data::{Column, Curve, Data, Row, SweptKey};
+pub use map::{FitMap, FitMapReport, MappedParameter};
+pub use nanotap_case::table::{Entry, MAX_ROWS, Table};
+use nanotap_figures::Figure;
+use nanotap_observe::frame::Frame;
+pub use quantity::Quantity;
+pub use report::{
+    ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
+    OtherOrbit, Reading, Undetermined,
+};
+
+use guess::begin_from_free_rows;
+use parameters::{begin, correct, keep_physical, parameters, starts};
+use problem::Problem;
+use problem::held::Loop;
+use search::Search;
+use solve::LeastSquares as _;
+
+use nanotap_case::Case;
+use nanotap_error::Error;
+use nanotap_motions::setpoint::at_setpoint;
+use nanotap_study::Study;
+use nanotap_study::request::options;
+use nanotap_study::value::Intervals;
+
+/// Largest number of initial values of a fit.
+const MAX_STARTS: usize = 1000;
+/// Name of the zero of the phase.
+const PHASE: &str = "phase.offset";
+/// Longest period of the orbits in drive periods.
+const MAX_PERIOD: usize = 64;
+
+options! {
+    /// Options of a fit.
+    pub struct FitOptions {
+        /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
+        /// `phase (deg)`
+        #[schemars(extend("x-own" = true))]
+        pub data: Vec<Table> = Vec::new(),
+        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub free: Vec<String> = Vec::new(),
+        /// Parameters to find with one value per curve
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub per_curve: Vec<String> = Vec::new(),
+        /// Conversions of columns, as in Amp="58 nm/V", Phase=90-x, Zsnsr=-x or Ch3=amplitude
+        #[schemars(extend("x-value" = "NAME=RULE"))]
+        pub convert: Vec<String> = Vec::new(),
+        /// Initial values of free parameters, and fixed corrections of columns, as in
+        /// gap.offset="10.3 nm"
+        #[schemars(extend("x-value" = "NAME=VALUE"))]
+        pub start: Vec<String> = Vec::new(),
+        /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
+        #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+        pub bounds: Intervals = Intervals::default(),
+        /// Columns of the data to use; default: all
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub columns: Vec<String> = Vec::new(),
+        /// Columns that name the pixel of a force volume, as in x,y: one fit a pixel, into a dataset
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub pixels: Vec<String> = Vec::new(),
+        /// Contact laws to compare, as in hertz,dmt; default: the law of the case
+        #[schemars(extend("x-value" = "LAW,…"))]
+        pub laws: Vec<String> = Vec::new(),
+        /// Average longer curves to about this many rows; 0: use every row
+        #[schemars(range(min = 0, max = MAX_ROWS), extend("x-value" = "ROWS"))]
+        pub rows: usize = 100,
+        /// Initial values to try until the data are described
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 8,
+        /// Seed of the further initial values
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 0,
+        /// Longest period of the orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 4,
+        /// Use the locations of jumps at folds as data
+        #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
+        pub jumps: bool = true,
+        /// Phase lag that the loop maintains, in degrees, for curves of a frequency shift
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Intervals from the profile of the likelihood
+        #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
+        pub profile: bool = true,
+    }
+}
+
+/// A fit of the model to measured curves.
+#[derive(Clone, Copy, Debug)]
+pub struct FitStudy;
+
+impl Study for FitStudy {
+    const NAME: &'static str = "fit";
+    const ABOUT: &'static str = "Fit parameters of lever and sample to measured curves";
+    const COUNTED: &'static str = "starts";
+    const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
+    type Options = FitOptions;
+    type Report = FitReport;
+
+    fn frames<'a>(_: &Case, report: &'a FitReport) -> Vec<Frame<'a>> {
+        vec![report.row_table(), report.law_table()]
+    }
+
+    fn figure(_: &Case, report: &FitReport) -> Option<Figure> {
+        Some(fit_figure(report))
+    }
+
+    fn compute(
+        case: &Case,
+        request: &FitOptions,
+        control: &Control<'_>,
+    ) -> Result<FitReport, Error> {
+        fit(case, request, control)
+    }
+}
+
+/// Finds the free parameters, for each of the laws to compare.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::case::table::Table;
+/// use nanotap::control::Control;
+/// use nanotap::study::fit::{FitOptions, fit};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/stiff-lever.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let data = Table::read(Path::new("../../docs/cases/polystyrene-curve.csv"))?;
+/// let options = FitOptions {
+///     data: vec![data],
+///     free: ["sample.modulus", "gap.offset"].map(str::to_owned).to_vec(),
+///     profile: false,
+///     ..FitOptions::default()
+/// };
+/// let found = fit(&case, &options, &Control::default())?;
+/// // The curve was made with 4 GPa, and with distances 0.3 nm too large.
+/// let [modulus, offset] = [0, 1].map(|k| found.parameters[k].value);
+/// assert!((modulus - 4e9).abs() < 0.2e9 && (offset.abs() - 0.3e-9).abs() < 0.05e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// If the data or the parameters are invalid, or no orbit is found for the data.
+pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
+    if names(&request.laws).is_empty() {
+        fit_one(case, request, control)
+    } else {
+        laws::compare(case, request, control)
+    }
+}
+
+/// Finds the free parameters under the law of the case. Rows in whose order the tip may have moved
+/// either way, and that the model does not describe, are tried in the other order.
+fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
+    let run = |request: &FitOptions| {
+        with_search(case, request, control, |search| {
+            let knows_way = search.problem.data.rows().any(|row| row.way.is_some());
+            let swept = search.problem.data.swept.first();
+            let by_distance = swept.is_some_and(|swept| data::is_distance(swept.key));
+            let is_rest = search.problem.data.is_force_curve();
+            Ok((search.run()?, knows_way || !by_distance || is_rest))
+        })
+    };
+    let (found, is_known) = run(request)?;
+    let [table] = &request.data[..] else {
+        return Ok(found);
+    };
+    let is_described = found.fits && !found.misfit;
+    if is_known || is_described || control.is_cancelled() {
+        return Ok(found);
+    }
+    let turned = FitOptions {
+        data: vec![table.reversed()],
+        ..request.clone()
+    };
+    match run(&turned) {
+        Ok((mut other, _)) if other.fits && !other.misfit => {
+            other.turned = true;
+            other.preparation.push(
+                "the rows are read in the other order, in which the model describes them: state a \
+                 column `direction` (approach, retract) to fix it"
+                    .to_owned(),
+            );
+            Ok(other)
+        }
+        _ => Ok(found),
+    }
+}
+
+/// Calls `work` with the data and parameters of a request.
+fn with_search<R>(
+    case: &Case,
+    request: &FitOptions,
+    control: &Control<'_>,
+    work: impl FnOnce(&Search<'_>) -> Result<R, Error>,
+) -> Result<R, Error> {
+    if request.data.is_empty() {
+        return Err(Error::option("data", "no data were given", "give a table"));
+    }
+    if !request.pixels.is_empty() {
+        return Err(Error::option(
+            "pixels",
+            "the fits of a force volume are a dataset",
+            "write it with `fit --out NAME.zarr`, or in Python with `fit_map`",
+        ));
+    }
+    let columns = names(&request.columns);
+    let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
+    let mut preparation = measured.notes;
+    let mut data = Data::read(case, &measured.tables, &measured.columns)?;
+    let sets_distance = data.swept.iter().any(|s| data::is_distance(s.key));
+    // The distance of the case is irrelevant if the rows set it.
+    let case = if sets_distance {
+        case.clone()
+    } else {
+        at_setpoint(case.clone(), control)?.0
+    };
+    let mut free = names(&request.free);
+    let mut per_curve = names(&request.per_curve);
+    let starts = starts(&request.start)?;
+    // A zero that was read from noisy rows is known no better than they are.
+    let has_phase = data.columns.iter().any(|c| c.quantity.name() == "phase");
+    let mut known = free.iter().chain(&per_curve);
+    let is_known = known.any(|n| n == PHASE) || starts.iter().any(|(name, _)| name == PHASE);
+    if measured.guessed_phase && has_phase && !is_known {
+        let own = if data.curves.len() > 1 {
+            &mut per_curve
+        } else {
+            &mut free
+        };
+        own.push(PHASE.to_owned());
+        preparation.push(
+            "phase.offset is free too, because the zero of the phase is a guess: state the phase with \
+             the option `convert` to fix it"
+                .to_owned(),
+        );
+    }
+    let corrected = correct(&case, &mut data, &starts, |name| {
+        free.iter().chain(&per_curve).any(|free| free == name)
+    })?;
+    preparation.extend(corrected);
+    data.add_free_scatter();
+    preparation.extend(data.average(request.rows));
+    if data.is_force_curve() {
+        preparation.extend(baseline::assumptions(&case, &data)?);
+    }
+    let mut parameters = parameters(&case, &data, &free, &per_curve, &request.bounds)?;
+    begin(&case, &data, &mut parameters, &starts)?;
+    preparation.extend(begin_from_free_rows(&case, &data, &mut parameters));
+    keep_physical(&mut parameters, &request.bounds);
+    let held = data
+        .is_modulated()
+        .then(|| Loop::of(&case, request.phase))
+        .transpose()?;
+    work(&Search {
+        preparation: &preparation,
+        problem: Problem {
+            case: &case,
+            data: &data,
+            parameters: &parameters,
+            max_period: request.max_period,
+            noise: Vec::new(),
+            robust: None,
+            jumps: Vec::new(),
+            held,
+        },
+        request,
+        control,
+    })
+}
+
+/// The measured curves of a fit as the model reads them: converted, not averaged.
+///
+/// # Errors
+/// If the data or a conversion is invalid.
+pub fn measured(case: &Case, request: &FitOptions) -> Result<Data, Error> {
+    let columns = names(&request.columns);
+    let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
+    Data::read(case, &measured.tables, &measured.columns)
+}
+
+/// Residuals of measured curves for given values of the free parameters, for users' solvers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Residuals {
+    /// Model minus measured value in standard errors, row by row and column by column; 0 for
+    /// missing values. Without a standard error in the data, it is 3 % of the spread of the column.
+    pub residuals: Vec<f64>,
+    /// Exact derivatives, one column per parameter in the order of `free` and `per_curve`.
+    pub jacobian: nalgebra::DMatrix<f64>,
+}
+
+/// Computes the residuals at `values` of the free parameters, on the branches of the data.
+///
+/// # Errors
+/// As [`fit`], and if the number of values is wrong or the residuals have no derivatives.
+pub fn residuals(
+    case: &Case,
+    request: &FitOptions,
+    values: &[f64],
+    control: &Control<'_>,
+) -> Result<Residuals, Error> {
+    with_search(case, request, control, |search| {
+        let count = search.problem.parameters.len();
+        if values.len() != count {
+            return Err(Error::input(
+                format!("got {} values for {count} parameters", values.len()),
+                "give one value per parameter",
+            ));
+        }
+        let problem = search.weighted(search.rough_noise(), None);
+        let (mut point, _) = problem.discover(values, None);
+        let residuals = problem.residuals(values, &point);
+        let jacobian = problem.jacobian(values, &mut point);
+        Ok(Residuals {
+            residuals: residuals.as_slice().to_vec(),
+            jacobian: jacobian
+                .ok_or_else(|| Error::numerics("the residuals have no derivatives there"))?,
+        })
+    })
+}
+
+/// Names, of which one text may contain several.
+fn names(given: &[String]) -> Vec<String> {
+    let parts = given.iter().flat_map(|text| text.split(','));
+    let names = parts.map(str::trim).filter(|name| !name.is_empty());
+    names.map(str::to_owned).collect()
+}

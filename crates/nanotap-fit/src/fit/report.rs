@@ -1,0 +1,285 @@
+//! Report of a fit.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use nanotap_motions::approach::Way;
+use nanotap_observe::frame::{Frame, Rows, columns, frame};
+
+/// Report of a fit. Values are in SI for a physical case, otherwise in the model's units; phases in
+/// degrees.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an independent answer, and a field in JSON"
+)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FitReport {
+    /// The free parameters with values and standard errors, in the order of the request.
+    pub parameters: Vec<FittedParameter>,
+    /// Sum of the squared residuals of values and jumps, each in standard errors; dimensionless.
+    pub chi2: f64,
+    /// Number of measured values and jumps minus number of parameters.
+    pub degrees_of_freedom: usize,
+    /// Probability of a larger chi2 by chance, 0 to 1, if all standard errors were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_value: Option<f64>,
+    /// Akaike's criterion, −2 ln L + 2 p. Of two laws fitted to the same data, the one with the
+    /// smaller value describes them better for its number of parameters, significantly if the
+    /// difference is above about ten. It does not show whether either law is right. A row without
+    /// an orbit counts as a residual of the whole spread of its column.
+    pub aic: f64,
+    /// Schwarz's criterion, −2 ln L + p ln n, whose penalty grows with the logarithm of the number
+    /// of measured values.
+    pub bic: f64,
+    /// Contact law of this fit, if several were compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<String>,
+    /// The compared laws, in the order of the request.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub laws: Vec<ComparedLaw>,
+    /// Whether the model describes the data.
+    pub fits: bool,
+    /// Reason if it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Whether the residuals are not the noise of the data: the law, the branch or an offset is not
+    /// theirs.
+    #[serde(default)]
+    pub misfit: bool,
+    /// Whether the rows were read in the other order.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub turned: bool,
+    /// Sentences that warn of what makes the result doubtful.
+    pub remarks: Vec<String>,
+    /// What was done to the data before the fit: conversions, guesses, fixed corrections, averages.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub preparation: Vec<String>,
+    /// Combinations of parameters that the data do not determine.
+    pub undetermined: Vec<Undetermined>,
+    /// Correlations of the parameters, in their order; 0 for undetermined ones.
+    pub correlations: Vec<Vec<f64>>,
+    /// The measured quantities and their residuals.
+    pub columns: Vec<FittedColumn>,
+    /// Key of the case that varies along the curves.
+    pub swept: String,
+    /// Its unit in SI, `1` if there is none.
+    pub swept_unit: String,
+    /// The rows, curve by curve.
+    pub rows: Vec<FittedRow>,
+    /// Jumps of the data from one branch to another at a fold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub jumps: Vec<FittedJump>,
+    /// Orbits at the rows on which the data are not.
+    pub others: Vec<OtherOrbit>,
+    /// Number of Levenberg–Marquardt steps of the final fit, after the search for branches.
+    pub iterations: usize,
+    /// Number of initial values that were tried.
+    pub starts: usize,
+    /// The case of the best fit as a file; if parameters differ between curves, that of the first.
+    pub case_file: String,
+    /// The case of each curve, if parameters differ between curves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub case_files: Vec<CurveCase>,
+    /// Whether the computation was cancelled before it was finished.
+    pub cancelled: bool,
+}
+
+impl FitReport {
+    /// The rows of the data: measured and model values of each column, and the residuals.
+    pub fn row_table<'a>(&'a self) -> Frame<'a> {
+        let unit = |unit: &str| match unit {
+            "1" => String::new(),
+            unit => format!(" ({unit})"),
+        };
+        let at = format!("{}{}", self.swept, unit(&self.swept_unit));
+        let mut rows = columns! { Rows::new("rows", &self.rows, None);
+            "curve", "curve", Plain => |row| row.curve.replace([',', '"', '\n'], " ");
+            "line", "line", Plain => |row| row.line as usize;
+            at, self.swept.clone(), Digits(5) => |row| row.at;
+            "branch", "branch", Plain => |row| row.branch;
+        };
+        for column in &self.columns {
+            let (name, unit) = (&column.name, unit(&column.unit));
+            let [measured, model] = ["", " model"].map(|word| format!("{name}{word}{unit}"));
+            let reading = move |row: &'a FittedRow| row.readings.get(name);
+            rows = columns! { rows;
+                measured, "measured", Digits(5) => move |row| reading(row)?.measured;
+                model, "model", Digits(5) => move |row| reading(row)?.model;
+                format!("{name} residual"), "residual", Digits(3) => move |row| reading(row)?.residual;
+            };
+        }
+        rows.frame()
+    }
+
+    /// The laws that were compared.
+    pub fn law_table(&self) -> Frame<'_> {
+        frame! { Rows::new("laws", &self.laws, None);
+            "law", "law", Plain => |law| &law.law;
+            "aic", "AIC", Digits(6) => |law| law.aic;
+            "bic", "BIC", Digits(6) => |law| law.bic;
+            "above_best", "above the least", Digits(3) => |law| law.above_best;
+            "weight", "weight", Digits(3) => |law| law.weight;
+            "fits", "fits", Plain => |law| if law.fits { "yes" } else { "no" };
+            .aligned(Right, Right);
+        }
+    }
+}
+
+/// A contact law among others that were fitted to the same data.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct ComparedLaw {
+    /// Name of the contact law, as in `sample.law`.
+    pub law: String,
+    /// Whether the law describes the data.
+    pub fits: bool,
+    /// Reason if it does not, or if it could not be fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Akaike's criterion; missing if nothing was fitted.
+    pub aic: Option<f64>,
+    /// Schwarz's criterion, −2 ln L + p ln n; missing if nothing was fitted.
+    pub bic: Option<f64>,
+    /// Difference of Akaike's criterion from the smallest one.
+    pub above_best: Option<f64>,
+    /// Akaike's weight, exp(−above/2) over the sum of all: the share of the evidence, if one of
+    /// these laws is right.
+    pub weight: Option<f64>,
+    /// Sum of the squared residuals, each in standard errors; dimensionless.
+    pub chi2: Option<f64>,
+    /// Number of measured values minus number of parameters.
+    pub degrees_of_freedom: Option<usize>,
+    /// The free parameters of this law with values and standard errors.
+    pub parameters: Vec<FittedParameter>,
+    /// Sentences that warn of what makes the fit of this law doubtful.
+    pub remarks: Vec<String>,
+    /// Case of the best fit with this law, as a file.
+    pub case_file: Option<String>,
+}
+
+/// The best case of one curve among several.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct CurveCase {
+    /// Name of the curve.
+    pub curve: String,
+    /// Case of the best fit for this curve, as a file.
+    pub case_file: String,
+}
+
+/// A free parameter with its best value and standard error.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedParameter {
+    /// The key of the case, or `NAME.offset`, `NAME.scale` of a column.
+    pub key: String,
+    /// Name of the curve to which the parameter applies; without it, all curves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<String>,
+    /// Best value, in `unit`.
+    pub value: f64,
+    /// Standard error of the best value, in `unit`; missing if the data do not determine it.
+    pub standard_error: Option<f64>,
+    /// Ends of the 95 % interval, in `unit`; an end is missing if it is not within the bounds.
+    pub interval: [Option<f64>; 2],
+    /// Unit of the values in SI, `1` if there is none.
+    pub unit: String,
+    /// Initial value of the fit, in `unit`.
+    pub start: f64,
+    /// Whether the best value is at a bound.
+    pub at_bound: bool,
+}
+
+/// A combination of parameters that the data do not determine.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Undetermined {
+    /// Sentence that describes the combination.
+    pub words: String,
+    /// Names of the parameters in the combination, those with the largest changes first.
+    pub keys: Vec<String>,
+    /// Changes of these parameters relative to their sizes; the vector of all changes has length 1.
+    pub direction: Vec<f64>,
+    /// Change of all residuals for this change, in standard errors: at most 1, or zero to rounding.
+    pub singular_value: f64,
+}
+
+/// A column of measured values with the size of its residuals.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedColumn {
+    /// Name of the column in the data.
+    pub name: String,
+    /// Name of the observable or reading that the column contains.
+    pub observable: String,
+    /// Unit of the values here.
+    pub unit: String,
+    /// Root mean square of measured minus model values, in `unit`.
+    pub residual: f64,
+    /// Standard error of the values for which the rows give none, in `unit`.
+    pub standard_error: f64,
+    /// Whether a standard error of the column was estimated from the residuals.
+    pub estimated: bool,
+}
+
+/// A row of the data with the model's values.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedRow {
+    /// Name of the curve to which the row belongs.
+    pub curve: String,
+    /// Line in the file, or number of the row from 1.
+    pub line: u64,
+    /// Direction of the abscissa, if given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub way: Option<Way>,
+    /// Value of the swept key with its offset, in [`FitReport::swept_unit`].
+    pub at: f64,
+    /// Index of the branch on which the orbit lies; missing if the row has no orbit.
+    pub branch: Option<usize>,
+    /// Period of the orbit, in drive periods.
+    pub period: Option<usize>,
+    /// Measured and model values, by the names of the columns.
+    pub readings: BTreeMap<String, Reading>,
+}
+
+/// A measured value with the value of the model.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Reading {
+    /// Measured value, in [`FittedColumn::unit`]; missing if nothing was measured.
+    pub measured: Option<f64>,
+    /// Model value with scale and offset, in [`FittedColumn::unit`]; missing if the row has no
+    /// orbit.
+    pub model: Option<f64>,
+    /// Measured minus model value, in standard errors.
+    pub residual: Option<f64>,
+}
+
+/// A jump of the data from a branch that ends in a fold.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct FittedJump {
+    /// Name of the curve on which the data jump.
+    pub curve: String,
+    /// The lines of the rows before and after it.
+    pub lines: [u64; 2],
+    /// Values of the swept key in the rows before and after the jump, with offsets, in
+    /// [`FitReport::swept_unit`].
+    pub between: [f64; 2],
+    /// The branches before and after it.
+    pub branches: [usize; 2],
+    /// Value of the swept key at the fold where the model's branch ends, in
+    /// [`FitReport::swept_unit`].
+    pub fold: f64,
+    /// Middle of the rows minus the fold, in standard errors, which are the distance of the rows
+    /// over √12.
+    pub residual: f64,
+}
+
+/// An orbit at a row on which the data are not.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct OtherOrbit {
+    /// Name of the curve to which the row belongs.
+    pub curve: String,
+    /// Value of the swept key in the row, with its offset, in [`FitReport::swept_unit`].
+    pub at: f64,
+    /// Index of the branch on which this orbit lies.
+    pub branch: usize,
+    /// Model values on this orbit with scales and offsets, by the names of the columns.
+    pub readings: BTreeMap<String, f64>,
+}

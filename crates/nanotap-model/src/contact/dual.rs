@@ -1,0 +1,3 @@
+//! A number with its derivative with respect to one parameter.
+
+pub use nanotap_arithmetic::Dual;

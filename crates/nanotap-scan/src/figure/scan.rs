@@ -1,0 +1,135 @@
+//! The figure of a scan: curves of a single line, images of several lines.
+
+use nanotap_figures::{
+    Axis, Band, Colour, DOUBLE_COLUMN, Dash, Figure, Heatmap, Legend, Line, ONE_AND_A_HALF_COLUMNS,
+    Panel, Rule,
+};
+
+use crate::scan::{CHANNELS, Channel, Interaction, Mode, ScanReport};
+
+/// Channels that are drawn: label, factor from SI, and values.
+fn drawn() -> impl Iterator<Item = (String, f64, &'static Channel)> {
+    let names = ["height", "amplitude_error", "phase", "peak_force_max"];
+    let channels = CHANNELS
+        .iter()
+        .filter(move |channel| names.contains(&channel.name));
+    channels.map(|channel| (channel.axis().0, channel.axis().1, channel))
+}
+
+/// Height, amplitude error, phase and largest peak force: of one line against the position, in both
+/// directions; of more lines as pictures of the trace. The caption is the verdict.
+pub fn scan_figure(report: &ScanReport) -> Figure {
+    let figure = if report.trace.height.len() == 1 {
+        line_figure(report)
+    } else {
+        image_figure(report)
+    };
+    figure.caption(&report.verdict)
+}
+
+/// Positions in µm where lines are long, else in nm, with the unit.
+fn along(report: &ScanReport) -> (f64, &'static str) {
+    if report.size[0] >= 2e-6 {
+        (1e6, "position $x$ (µm)")
+    } else {
+        (1e9, "position $x$ (nm)")
+    }
+}
+
+fn line_figure(report: &ScanReport) -> Figure {
+    let (factor, label) = along(report);
+    let positions = report.pixel_positions();
+    let of = |values: &[f64], scale: f64| -> Vec<(f64, f64)> {
+        let both = positions.iter().zip(values);
+        both.map(|(x, y)| (factor * x, scale * y)).collect()
+    };
+    let mut figure = Figure::new(4, 1)
+        .width(ONE_AND_A_HALF_COLUMNS)
+        .height(180.0)
+        .row_heights([1.6, 1.0, 1.0, 1.3])
+        .share_x();
+    for (k, (title, scale, channel)) in drawn().enumerate() {
+        let x = Axis::linear(label).range(0.0, factor * report.size[0]);
+        let mut panel = Panel::new(x, Axis::linear(title));
+        for change in &report.branch_changes {
+            panel = panel.with(Rule::vertical(factor * change.x));
+        }
+        if k == 0 {
+            let bands = bands(report, factor, Interaction::Attractive);
+            if !bands.is_empty() {
+                panel = panel.with(Band::x(bands).label("attractive state"));
+            }
+            let level = surface_level(report);
+            let surface: Vec<f64> = report.trace.surface[0].iter().map(|h| h + level).collect();
+            panel = panel.with(
+                Line::new(of(&surface, scale))
+                    .colour(Colour::GREY)
+                    .dash(Dash::Dashed)
+                    .label("surface"),
+            );
+        }
+        let colours = [Colour::BLUE, Colour::VERMILLION];
+        for ((name, image), colour) in report.directions().zip(colours) {
+            let line = Line::new(of(&(channel.values)(image)[0], scale)).colour(colour);
+            panel = panel.with(if k == 0 { line.label(name) } else { line });
+        }
+        figure = figure.with(panel.legend(if k == 0 {
+            Legend::Above
+        } else {
+            Legend::Hidden
+        }));
+    }
+    figure
+}
+
+/// The distance at which the surface is drawn below the height.
+fn surface_level(report: &ScanReport) -> f64 {
+    if report.mode == Mode::ConstantHeight {
+        return report.z0;
+    }
+    let pixels = report.trace.height[0].iter().zip(&report.trace.surface[0]);
+    let mut apart: Vec<f64> = pixels.map(|(z, h)| z - h).collect();
+    apart.retain(|value| value.is_finite());
+    apart.sort_by(f64::total_cmp);
+    apart.get(apart.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Stretches of the trace in a state.
+fn bands(report: &ScanReport, factor: f64, state: Interaction) -> Vec<(f64, f64)> {
+    let states = &report.trace.state[0];
+    let step = factor * report.size[0] / states.len().max(1) as f64;
+    let mut bands: Vec<(f64, f64)> = Vec::new();
+    for (k, _) in states
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| **s == Some(state))
+    {
+        let (from, to) = (step * k as f64, step * (k + 1) as f64);
+        match bands.last_mut() {
+            Some(last) if (last.1 - from).abs() < 0.5 * step => last.1 = to,
+            _ => bands.push((from, to)),
+        }
+    }
+    bands
+}
+
+fn image_figure(report: &ScanReport) -> Figure {
+    let (factor, label) = along(report);
+    let size = report.size.map(|size| factor * size);
+    let mut figure = Figure::new(2, 2).width(DOUBLE_COLUMN).height(150.0);
+    for (title, scale, channel) in drawn() {
+        let rows = (channel.values)(&report.trace);
+        let x = Axis::linear(label).tight();
+        let y = Axis::linear(label.replace("$x$", "$y$")).tight();
+        let pixels = rows.iter().flatten().map(|value| scale * value);
+        figure = figure.with(Panel::new(x, y).with(Heatmap::new(
+            rows[0].len(),
+            rows.len(),
+            pixels,
+            (0.0, size[0]),
+            (0.0, size[1]),
+            Axis::linear(title),
+        )));
+    }
+    figure
+}

@@ -1,0 +1,9 @@
+//! The figures of these studies.
+
+pub mod basin;
+pub mod bimodal;
+pub mod contact_laws;
+pub mod convergence;
+pub mod modes;
+pub mod sweep;
+pub mod window;

@@ -18,8 +18,8 @@ mod request;
 mod series;
 mod study_arguments;
 mod style;
-mod table;
 mod targets;
+mod text_table;
 mod threads;
 
 use std::ffi::OsString;

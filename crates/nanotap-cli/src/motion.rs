@@ -17,7 +17,7 @@ use nanotap::study::simulate::Classification;
 
 use crate::output::Output;
 pub(crate) use crate::page::paragraph;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::{number, style};
 
 /// The heading: what the motion is.

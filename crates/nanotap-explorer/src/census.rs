@@ -63,7 +63,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
             "words": format!("{name}, {share}"),
             "start": Start::text(None, &non_periodic.state),
             "amplitude": non_periodic.observables.amplitude,
-            "shown": shown(&non_periodic.observables, &units),
+            "shown": shown_observables(&non_periodic.observables, &units),
         }))
     });
     let unstable = found.unstable.iter().flatten();
@@ -74,7 +74,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
 
 /// The amplitude and the peak force of a lever, as an instrument reads them; without units half of
 /// peak to peak, which differs between motions of other periods too.
-fn shown(observables: &Observables, units: &Units) -> String {
+fn shown_observables(observables: &Observables, units: &Units) -> String {
     let text = |kind: Kind, value: f64| match units.si(kind) {
         Some(unit) => kind.format_digits(unit * value, 4),
         None => Kind::Number.format_digits(value, 4),
@@ -95,7 +95,7 @@ fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str, units: &Units
         "period": orbit.period,
         "stable": orbit.stable,
         "amplitude": orbit.observables.amplitude,
-        "shown": shown(&orbit.observables, units),
+        "shown": shown_observables(&orbit.observables, units),
     })
 }
 

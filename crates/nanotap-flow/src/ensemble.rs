@@ -16,7 +16,7 @@ use crate::search::Start;
 use crate::search::interval::{Cubic, Quintic};
 use crate::search::near::Near;
 use crate::search::side_by_side::{self, Intervals, Signals};
-use crate::search::table::Table;
+use crate::search::tabulated::Table;
 use crate::search::walk::Bounds;
 use crate::signal::NOISE;
 use crate::simd::{

@@ -4,7 +4,7 @@
 //! share one need not count references to it every period.
 
 use crate::observer::{Observer, SegmentView, SwitchView};
-use crate::search::table::Followed;
+use crate::search::tabulated::Followed;
 use crate::search::{BySteps, Crossing, Start, Statistics, on_table, sign_changes};
 use crate::signal::Signal;
 use crate::simd::{self, ComplexVector, Library, Simd, Work, layout};

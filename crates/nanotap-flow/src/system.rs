@@ -3,7 +3,7 @@
 use crate::harmonic::{HarmonicVector, Output};
 use crate::regime::{Kernel, KernelFrame, ModalOutput, Regime};
 use crate::search::Start;
-use crate::search::table::Table;
+use crate::search::tabulated::Table;
 use crate::simd::affine::AffineMap;
 use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, layout};

@@ -898,7 +898,7 @@ impl Measured<'_> {
     }
 
     /// Observables in the model's units and, of a physical case, in SI.
-    fn seen(
+    fn observables_at(
         &self,
         parameter: f64,
         orbit: &PeriodicOrbit,
@@ -928,7 +928,7 @@ impl Measured<'_> {
         parameter: f64,
         orbit: &PeriodicOrbit,
     ) -> Result<PointReport, Error> {
-        let (observables, physical) = self.seen(parameter, orbit)?;
+        let (observables, physical) = self.observables_at(parameter, orbit)?;
         Ok(PointReport {
             branch,
             period: orbit.period,
@@ -943,7 +943,7 @@ impl Measured<'_> {
     }
 
     fn bifurcation(&self, branch: usize, b: &Bifurcation) -> Result<BifurcationReport, Error> {
-        let (observables, physical) = self.seen(b.parameter, &b.orbit)?;
+        let (observables, physical) = self.observables_at(b.parameter, &b.orbit)?;
         let (angle, time) = match b.kind {
             BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
             BifurcationKind::Grazing { time } => (None, Some(time)),

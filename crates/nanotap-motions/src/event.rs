@@ -101,26 +101,31 @@ impl Event {
 }
 
 /// An orbit, and how far its observable is above the value of the event.
-struct Seen {
+struct MeasuredOrbit {
     orbit: PeriodicOrbit,
     excess: f64,
 }
 
-impl Seen {
+impl MeasuredOrbit {
     fn state(&self) -> &[f64] {
         &self.orbit.states[0]
     }
 }
 
 /// Closes the orbit near `state` and measures its excess; `None` where either fails.
-fn seen(case: &Case, state: &[f64], period: usize, event: &Event) -> Option<Seen> {
+fn measured_orbit(
+    case: &Case,
+    state: &[f64],
+    period: usize,
+    event: &Event,
+) -> Option<MeasuredOrbit> {
     let model = case.model().ok()?;
     let mut map = ModelMap::new(&model);
     let orbit = close_orbit(&mut map, state, period, &ShootingOptions::default()).ok()?;
     let start = orbit.states.first()?;
     let observables = measure(&model, start, period, ObservableSet::COMMON).ok()?;
     let excess = event.excess(case, &observables)?;
-    Some(Seen { orbit, excess })
+    Some(MeasuredOrbit { orbit, excess })
 }
 
 /// The values of the parameter and the orbits at which an event happens, between neighbouring points
@@ -164,7 +169,7 @@ fn between(
         return None;
     }
     let size = below.abs().max(above.abs());
-    let mut best: Option<(f64, Seen)> = None;
+    let mut best: Option<(f64, MeasuredOrbit)> = None;
     for trial in 0..TRIALS {
         let part = if trial % 3 == 2 {
             0.5 * (low + high)
@@ -175,7 +180,7 @@ fn between(
         let guess: Vec<f64> = (a.state.iter().zip(&b.state))
             .map(|(x, y)| x + part * (y - x))
             .collect();
-        let at = seen(&case.with(key, parameter), &guess, a.period, event)?;
+        let at = measured_orbit(&case.with(key, parameter), &guess, a.period, event)?;
         let (found, closer) = (at.excess, best.as_ref());
         if closer.is_none_or(|(_, known)| found.abs() < known.excess.abs()) {
             best = Some((parameter, at));
@@ -217,17 +222,23 @@ impl Window<'_> {
         })
     }
 
-    fn seen(&self, at: [f64; 2], state: &[f64], period: usize, event: &Event) -> Option<Seen> {
+    fn orbit_at(
+        &self,
+        at: [f64; 2],
+        state: &[f64],
+        period: usize,
+        event: &Event,
+    ) -> Option<MeasuredOrbit> {
         let [first, second] = self.values(at);
         let case = self.case.with(self.keys[0], first);
-        seen(&case.with(self.keys[1], second), state, period, event)
+        measured_orbit(&case.with(self.keys[1], second), state, period, event)
     }
 
     /// The gradient of the excess.
     fn gradient(
         &self,
         at: [f64; 2],
-        here: &Seen,
+        here: &MeasuredOrbit,
         period: usize,
         event: &Event,
     ) -> Option<[f64; 2]> {
@@ -236,7 +247,7 @@ impl Window<'_> {
             let mut there = at;
             // Towards the middle of the window.
             there[k] += if at[k] < 0.5 { DIFFERENCE } else { -DIFFERENCE };
-            let seen = self.seen(there, here.state(), period, event)?;
+            let seen = self.orbit_at(there, here.state(), period, event)?;
             slope[k] = (seen.excess - here.excess) / (there[k] - at[k]);
         }
         let norm = nanotap_arithmetic::hypot(slope[0], slope[1]);
@@ -252,11 +263,11 @@ impl Window<'_> {
         control: &Control<'_>,
     ) -> Option<CurveReport> {
         let start = self.place(values);
-        let here = self.seen(start, state, period, event)?;
+        let here = self.orbit_at(start, state, period, event)?;
         let gradient = self.gradient(start, &here, period, event)?;
         let mut halves: Vec<(Vec<[f64; 2]>, &'static str)> = Vec::new();
         for sign in [-1.0, 1.0] {
-            let first = Seen {
+            let first = MeasuredOrbit {
                 orbit: here.orbit.clone(),
                 excess: here.excess,
             };
@@ -290,7 +301,7 @@ impl Window<'_> {
     fn half(
         &self,
         start: [f64; 2],
-        mut here: Seen,
+        mut here: MeasuredOrbit,
         mut gradient: [f64; 2],
         sign: f64,
         (period, event): (usize, &Event),
@@ -347,14 +358,14 @@ impl Window<'_> {
     fn corrected(
         &self,
         from: [f64; 2],
-        near: &Seen,
+        near: &MeasuredOrbit,
         gradient: [f64; 2],
         (period, event): (usize, &Event),
-    ) -> Option<([f64; 2], Seen)> {
+    ) -> Option<([f64; 2], MeasuredOrbit)> {
         let norm = nanotap_arithmetic::hypot(gradient[0], gradient[1]);
         let normal = gradient.map(|v| v / norm);
         let (mut at, mut slope) = (from, norm);
-        let mut seen = self.seen(at, near.state(), period, event)?;
+        let mut seen = self.orbit_at(at, near.state(), period, event)?;
         for _ in 0..8 {
             let move_by = -seen.excess / slope;
             if move_by.abs() > STEPS[0] {
@@ -364,7 +375,7 @@ impl Window<'_> {
                 return Some((at, seen));
             }
             let there = [0, 1].map(|k| at[k] + move_by * normal[k]);
-            let next = self.seen(there, seen.state(), period, event)?;
+            let next = self.orbit_at(there, seen.state(), period, event)?;
             let secant = (next.excess - seen.excess) / move_by;
             if secant != 0.0 && secant.is_finite() {
                 slope = secant;

@@ -728,7 +728,7 @@ impl HeldQuantity {
         }
     }
 
-    fn shown(&self, value: f64) -> String {
+    fn value_text(&self, value: f64) -> String {
         match self.setpoint {
             Held::Amplitude(_) => format!("{:.3}", value / self.free_amplitude),
             Held::PeakForce(_) => Kind::Force.format(value * self.force_unit),
@@ -753,7 +753,7 @@ impl HeldQuantity {
             Held::PeakForce(_) => "the peak force",
             Held::Phase(_) | Held::Shift(_) => "the phase",
         };
-        format!("{name} is {}", self.shown(value))
+        format!("{name} is {}", self.value_text(value))
     }
 
     const fn remedy(&self) -> &'static str {
@@ -888,7 +888,7 @@ impl Search<'_> {
                 "the setpoint {words} was not reached: {}, to gap.tip = {}; give gap.tip, or \
                  {remedy} drive.setpoint",
                 budget_text(steps),
-                self.shown(self.nearest_gap),
+                self.distance_text(self.nearest_gap),
             ),
             None => format!(
                 "the setpoint {words} is not reached on the way to the sample's own position \
@@ -904,7 +904,7 @@ impl Search<'_> {
     }
 
     /// Formats a distance that is given in the model's unit of length.
-    fn shown(&self, gap: f64) -> String {
+    fn distance_text(&self, gap: f64) -> String {
         self.case.physical().map_or_else(
             || gap.to_string(),
             |view| Kind::Length.format(gap * view.scales.length),
@@ -938,10 +938,10 @@ impl Search<'_> {
                         "on approach the {name} jumps past the setpoint {}: from {} to {}{of} \
                          between gap.tip = {} and {}; change drive.setpoint, or give gap.tip",
                         held.words(),
-                        held.shown(before),
-                        held.shown(value),
-                        self.shown(from),
-                        self.shown(*gap)
+                        held.value_text(before),
+                        held.value_text(value),
+                        self.distance_text(from),
+                        self.distance_text(*gap)
                     )))
                 };
                 let crossed = before.as_ref().map(|last| {
@@ -984,7 +984,7 @@ impl Search<'_> {
                 self.found = Some(Err(Error::numerics(format!(
                     "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
                      reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
-                    self.shown(gap),
+                    self.distance_text(gap),
                     held.words(),
                     match held.setpoint {
                         Held::Amplitude(_) => "amplitude",

@@ -424,7 +424,7 @@ impl ClearanceSearch {
     }
 
     /// The clearance over the finished periods.
-    pub(super) fn found(mut self, model: &Model) -> Result<Option<Clearance>, FlowError> {
+    pub(super) fn finish(mut self, model: &Model) -> Result<Option<Clearance>, FlowError> {
         let Some(beam) = &model.beam else {
             return Ok(None);
         };
@@ -546,7 +546,7 @@ impl SampledClearance {
     }
 
     /// The clearance over the added periods.
-    pub(super) fn found(self, model: &Model, nonlinear: &Arc<Nonlinear>) -> Option<Clearance> {
+    pub(super) fn finish(self, model: &Model, nonlinear: &Arc<Nonlinear>) -> Option<Clearance> {
         let lowest = self.lowest?;
         let near = lowest.least() + BETWEEN_SAMPLES * lowest.swing;
         let last = lowest.places.len() - 1;

@@ -24,7 +24,7 @@ use serde_json::{Map, Value as Json, json};
 use super::clearance::Clearance;
 use super::functional::{Requirements, Signal, Tone};
 use super::measure::beginnings;
-use super::measured::{Beginnings, Found, Impacts, Measured};
+use super::measured::{Beginnings, Impacts, Measured, MeasuredValues};
 use super::number::Phasor;
 use super::record::measure;
 use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
@@ -620,7 +620,7 @@ impl<'a> Followed<'a> {
         let required = &self.required.functionals;
         let lowest = gathered.values.get(required.len()).map(|value| value.re);
         let values = gathered.values.into_iter().map(Phasor::from);
-        let found = Found {
+        let found = MeasuredValues {
             values: required.iter().copied().zip(values).collect(),
             duration: gathered.duration,
             periods: period as u64,

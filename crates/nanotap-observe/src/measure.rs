@@ -16,7 +16,7 @@ use super::clearance::ClearanceSearch;
 use super::contact_event::Contacts;
 use super::energy::{Ends, stored_by_sample};
 use super::functional::{Functional, Requirements, Signal};
-use super::measured::{Beginnings, Found, Impacts};
+use super::measured::{Beginnings, Impacts, MeasuredValues};
 use super::number::Phasor;
 use super::record::{Engine, Measurements, RecordOptions, Run};
 use super::table::ObservableSet;
@@ -212,7 +212,7 @@ impl Measurement<'_> {
         let model = self.of.model;
         let (gathered, search) = (&self.accumulator, self.clearance.take());
         let found = if gathered.duration() > 0.0 {
-            let clearance = search.map(|search| search.found(model)).transpose()?;
+            let clearance = search.map(|search| search.finish(model)).transpose()?;
             let value = |(functional, number): (&Functional, &usize)| {
                 let mut value = Phasor::from(gathered.values()[*number]);
                 // The ends of periods belong to the whole.
@@ -222,7 +222,7 @@ impl Measurement<'_> {
                 (*functional, value)
             };
             let functionals = self.of.required.functionals.iter();
-            Some(Found {
+            Some(MeasuredValues {
                 values: functionals.zip(&self.of.numbers).map(value).collect(),
                 duration: gathered.duration(),
                 periods: gathered.periods(),

@@ -12,11 +12,11 @@ use nanotap_model::Model;
 pub(super) struct Measured<'a, D = f64> {
     pub(super) model: &'a Model,
     pub(super) required: Requirements,
-    pub(super) found: Option<Found<D>>,
+    pub(super) found: Option<MeasuredValues<D>>,
 }
 
 /// The measurements of a motion.
-pub(super) struct Found<D> {
+pub(super) struct MeasuredValues<D> {
     /// The values of the required functionals, in their order.
     pub(super) values: Vec<(Functional, Phasor<D>)>,
     /// Duration of the motion, in model units.
@@ -36,7 +36,7 @@ pub(super) struct Found<D> {
     pub(super) tone_phases: Vec<D>,
 }
 
-impl Found<f64> {
+impl MeasuredValues<f64> {
     /// Computes the observables of `set` from the measurements.
     pub(super) fn observables(self, model: &Model, set: ObservableSet) -> Observables {
         Observables::read(set, &mut Measured::of(model, Some(self)))
@@ -80,7 +80,7 @@ impl<D: Number> Impacts<D> {
 
 impl<'a, D: Number> Measured<'a, D> {
     /// Creates measurements from those found, or `None` before the run.
-    pub(super) fn of(model: &'a Model, found: Option<Found<D>>) -> Self {
+    pub(super) fn of(model: &'a Model, found: Option<MeasuredValues<D>>) -> Self {
         Self {
             model,
             required: Requirements::default(),
@@ -102,7 +102,7 @@ impl<'a, D: Number> Measured<'a, D> {
         known.map_or(unknown, |(_, value)| *value)
     }
 
-    fn gathered(&self, read: impl Fn(&Found<D>) -> D) -> D {
+    fn gathered(&self, read: impl Fn(&MeasuredValues<D>) -> D) -> D {
         self.found.as_ref().map_or_else(D::default, read)
     }
 

@@ -10,7 +10,7 @@ use super::clearance::SampledClearance;
 use super::contact_event::{ContactEvent, ContactEventKind};
 use super::energy::stored_by_lever;
 use super::functional::{Requirements, Signal};
-use super::measured::{Beginnings, Found, Impacts};
+use super::measured::{Beginnings, Impacts, MeasuredValues};
 use super::number::Phasor;
 use super::record::{Engine, Measurements, RecordOptions, Run};
 use super::table::ObservableSet;
@@ -135,7 +135,7 @@ impl Run for NonlinearRun<'_> {
         let [before, after] = run.energies;
         let by_sample = after.1 - before.1;
         let functionals = run.of.required.functionals.iter().copied();
-        let found = Found {
+        let found = MeasuredValues {
             values: functionals
                 .zip(run.values.into_iter().map(Phasor::from))
                 .collect(),
@@ -149,7 +149,7 @@ impl Run for NonlinearRun<'_> {
             tone_phases: model.tone_phases.clone(),
             clearance: run
                 .clearance
-                .and_then(|search| search.found(model, nonlinear)),
+                .and_then(|search| search.finish(model, nonlinear)),
         };
         Ok(Measurements {
             found: (run.periods > 0).then_some(found),

@@ -5,7 +5,7 @@ use nanotap_dynamics::PeriodicOrbit;
 use super::clearance::Clearance;
 use super::contact_event::ContactEvent;
 use super::measure::PiecewiseLinear;
-use super::measured::Found;
+use super::measured::MeasuredValues;
 use super::nonlinear::Nonlinear;
 use super::table::{ObservableSet, Observables};
 use nanotap_model::recording::Recording;
@@ -73,7 +73,7 @@ pub(super) trait Run {
 /// The measurements of a run.
 pub(super) struct Measurements {
     /// `None` for a run of zero length.
-    pub(super) found: Option<Found<f64>>,
+    pub(super) found: Option<MeasuredValues<f64>>,
     pub(super) recording: Recording,
     pub(super) events: Vec<ContactEvent>,
     pub(super) lows: Vec<f64>,
@@ -159,7 +159,7 @@ impl<'a> Recorder<'a> {
         }
         let end = run.state();
         let measured = run.finish()?;
-        let observables = |found: Found<f64>| found.observables(self.model, self.set);
+        let observables = |found: MeasuredValues<f64>| found.observables(self.model, self.set);
         Ok(Recorded {
             observables: measured.found.map_or(Observables::UNKNOWN, observables),
             recording: measured.recording,

@@ -37,12 +37,12 @@ pub(super) struct Runs<'a> {
     /// Reported progress in percent; it never decreases.
     reported: AtomicUsize,
     counts: RefCell<Vec<Rc<Counted>>>,
-    found: RefCell<Vec<Found>>,
+    found: RefCell<Vec<CaseOrbits>>,
     shared: RefCell<Vec<Rc<dyn Any>>>,
 }
 
 /// The orbits of a case that one search found.
-struct Found {
+struct CaseOrbits {
     case: Cantilever,
     search: OrbitSearch,
     orbits: Rc<[PeriodicOrbit]>,
@@ -143,7 +143,7 @@ impl<'a> Runs<'a> {
             run,
             ..OrbitSearch::default()
         };
-        let same = |f: &&Found| f.case == counted.case && f.search == search;
+        let same = |f: &&CaseOrbits| f.case == counted.case && f.search == search;
         if let Some(known) = self.found.borrow().iter().find(same) {
             return Ok(Rc::clone(&known.orbits));
         }
@@ -152,7 +152,7 @@ impl<'a> Runs<'a> {
         let orbits: Rc<[PeriodicOrbit]> = self
             .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control))
             .into();
-        self.found.borrow_mut().push(Found {
+        self.found.borrow_mut().push(CaseOrbits {
             case: counted.case.clone(),
             search,
             orbits: Rc::clone(&orbits),

@@ -202,7 +202,7 @@ impl<'a> Property<'a> {
     /// # Errors
     /// What is wrong, and what would be right.
     fn check(&self, value: &Value) -> Result<(), Error> {
-        let refuse = |remedy: String| Err(Error::option(self.name, shown(value), remedy));
+        let refuse = |remedy: String| Err(Error::option(self.name, text_of(value), remedy));
         let words = self.words();
         match value {
             Value::String(word) if !words.is_empty() => {
@@ -310,7 +310,7 @@ fn element(text: &str) -> Value {
         .unwrap_or_else(|| text.into())
 }
 
-fn shown(value: &Value) -> String {
+fn text_of(value: &Value) -> String {
     match value {
         Value::String(text) => format!("`{text}` is not right"),
         Value::Null => "it must be given".into(),
@@ -327,7 +327,7 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
     let schema = &*known_schema::<R>();
     let Value::Object(given) = given else {
         return Err(Error::input(
-            shown(&given),
+            text_of(&given),
             "an object with the options is needed",
         ));
     };

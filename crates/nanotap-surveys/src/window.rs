@@ -152,7 +152,7 @@ impl Window {
 }
 
 /// One motion found from one start.
-struct Seen {
+struct ReachedMotion {
     class: Option<Classification>,
     period: i32,
     amplitude: f64,
@@ -160,7 +160,7 @@ struct Seen {
     contact: f64,
 }
 
-impl From<&FromNeighbour> for Seen {
+impl From<&FromNeighbour> for ReachedMotion {
     fn from(motion: &FromNeighbour) -> Self {
         let repeats = motion.period > 0;
         Self {
@@ -193,7 +193,7 @@ impl Window {
             });
         }
         let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
-        let mut seen: Vec<Vec<Seen>> = (0..rows * columns).map(|_| Vec::new()).collect();
+        let mut seen: Vec<Vec<ReachedMotion>> = (0..rows * columns).map(|_| Vec::new()).collect();
         let variables = [
             "classification",
             "period",
@@ -203,7 +203,7 @@ impl Window {
         ];
         store.each(variables, |entry, row| {
             let [class, period, amplitude, maximum, contact] = row;
-            seen[entry[0] * columns + entry[1]].push(Seen {
+            seen[entry[0] * columns + entry[1]].push(ReachedMotion {
                 class: class_of(class as u8),
                 period: period as i32,
                 amplitude,
@@ -214,7 +214,7 @@ impl Window {
         for motion in from_neighbours(store)? {
             let point = motion.at[1] * columns + motion.at[0];
             if let Some(seen) = seen.get_mut(point) {
-                seen.push(Seen::from(&motion));
+                seen.push(ReachedMotion::from(&motion));
             }
         }
         let mut distances = Vec::new();
@@ -282,7 +282,7 @@ impl Window {
 
 /// Returns the condition of a point by its motions. Motions that were found count before those that
 /// could not be classified.
-fn condition(motions: &[Seen]) -> Condition {
+fn condition(motions: &[ReachedMotion]) -> Condition {
     let any = |wanted: &[Classification]| {
         motions
             .iter()
@@ -294,8 +294,8 @@ fn condition(motions: &[Seen]) -> Condition {
     if motions.iter().any(|m| m.period > 1) {
         return Condition::Subharmonic;
     }
-    let orbits: Vec<&Seen> = motions.iter().filter(|m| m.period == 1).collect();
-    let differ = |a: &Seen, b: &Seen| {
+    let orbits: Vec<&ReachedMotion> = motions.iter().filter(|m| m.period == 1).collect();
+    let differ = |a: &ReachedMotion, b: &ReachedMotion| {
         let same = SameMotion::numbers;
         !same(a.amplitude, b.amplitude) || !same(a.maximum, b.maximum)
     };
@@ -425,8 +425,8 @@ impl DatasetStudy for WindowStudy {
 mod tests {
     use super::*;
 
-    fn seen(class: Classification, period: i32, amplitude: f64, contact: f64) -> Seen {
-        Seen {
+    fn reached(class: Classification, period: i32, amplitude: f64, contact: f64) -> ReachedMotion {
+        ReachedMotion {
             class: Some(class),
             period,
             amplitude,
@@ -438,30 +438,30 @@ mod tests {
     #[test]
     fn what_threatens_most_is_named() {
         use Classification::{Chaotic, Periodic, QuasiPeriodic, Undecided};
-        let free = || seen(Periodic, 1, 1.0, 0.0);
-        let taps = || seen(Periodic, 1, 0.8, 0.1);
+        let free = || reached(Periodic, 1, 1.0, 0.0);
+        let taps = || reached(Periodic, 1, 0.8, 0.1);
         for (motions, expected) in [
             (vec![free(), free()], Condition::NoContact),
             (vec![taps(), taps()], Condition::OnePeriod1),
             (vec![taps(), free()], Condition::SecondState),
             (
-                vec![taps(), seen(Periodic, 2, 0.8, 0.1)],
+                vec![taps(), reached(Periodic, 2, 0.8, 0.1)],
                 Condition::Subharmonic,
             ),
             (
-                vec![free(), seen(Chaotic, 0, 0.8, 0.1)],
+                vec![free(), reached(Chaotic, 0, 0.8, 0.1)],
                 Condition::Irregular,
             ),
             (
-                vec![free(), seen(QuasiPeriodic, 0, 0.8, 0.1)],
+                vec![free(), reached(QuasiPeriodic, 0, 0.8, 0.1)],
                 Condition::Irregular,
             ),
             (
-                vec![taps(), seen(Undecided, 0, 0.0, 0.0)],
+                vec![taps(), reached(Undecided, 0, 0.0, 0.0)],
                 Condition::Undecided,
             ),
             (
-                vec![taps(), free(), seen(Undecided, 0, 0.0, 0.0)],
+                vec![taps(), free(), reached(Undecided, 0, 0.0, 0.0)],
                 Condition::SecondState,
             ),
             (vec![], Condition::Undecided),

@@ -156,7 +156,7 @@ struct Work {
 
 /// The place at which a guard falls on a step.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct GuardFall {
     exit: usize,
     u: f64,
 }
@@ -165,7 +165,7 @@ enum Attempt {
     /// The step is accepted without an event; the next length number may be lower by this.
     Whole(usize),
     /// The law switches on the step.
-    Falls(Found),
+    Falls(GuardFall),
     /// A shorter step, of this length number, must be tried.
     Shorter(usize, Refusal),
     /// A singular exit of this number is reached about this time after the start.
@@ -803,10 +803,10 @@ impl Flow {
     }
 
     /// Returns the first switch on the step in `self.step`.
-    fn first_switch(&mut self, system: &System) -> Result<Option<Found>, Refusal> {
+    fn first_switch(&mut self, system: &System) -> Result<Option<GuardFall>, Refusal> {
         let n = self.step.forces.len();
         let fresh = self.onset.is_some();
-        let mut found: Option<Found> = None;
+        let mut found: Option<GuardFall> = None;
         for (number, exit) in system.exits(self.branch).iter().enumerate() {
             self.guard_values(system, exit, n);
             let size = crate::step::largest(&self.work.values);
@@ -842,7 +842,7 @@ impl Flow {
             if let Fall::At(u) = first_fall(&self.work.series, &mut self.work.scratch)
                 && found.is_none_or(|f| u < f.u)
             {
-                found = Some(Found { exit: number, u });
+                found = Some(GuardFall { exit: number, u });
             }
         }
         Ok(found)

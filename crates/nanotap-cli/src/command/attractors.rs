@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 

@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::Table;
+use crate::text_table::Table;
 
 /// Compute basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use nanotap::figure::branch::{Shown, case_figure};
+use nanotap::figure::branch::{PlottedQuantity, case_figure};
 use nanotap::observe::time_series;
 use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy};
 
@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::Table;
+use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
 
     /// Observable that --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
-    show: Option<Shown>,
+    show: Option<PlottedQuantity>,
 
     #[command(flatten)]
     points: PointsArgument,
@@ -36,10 +36,12 @@ pub(crate) struct Arguments {
 }
 
 /// The names of what can be shown.
-fn shown() -> impl TypedValueParser<Value = Shown> {
-    let choices = Shown::choices().map(|(name, what)| PossibleValue::new(name).help(what));
-    PossibleValuesParser::new(choices)
-        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("unknown observable {name}")))
+fn shown() -> impl TypedValueParser<Value = PlottedQuantity> {
+    let choices =
+        PlottedQuantity::choices().map(|(name, what)| PossibleValue::new(name).help(what));
+    PossibleValuesParser::new(choices).try_map(|name| {
+        PlottedQuantity::named(&name).ok_or_else(|| format!("unknown observable {name}"))
+    })
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
@@ -47,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         .study
         .read_varied(BranchOptions::first_value, output)?;
     case.note_constants(&[options.range(&case)?.key], output);
-    if let Some(shown) = arguments.show.and_then(Shown::observable) {
+    if let Some(shown) = arguments.show.and_then(PlottedQuantity::observable) {
         options.observables = options.observables.with(shown);
     }
     let mut report = progress::study::<BranchStudy>(&case, &options, &arguments.threads)?;

@@ -26,7 +26,7 @@ use crate::arguments::CaseArguments;
 use crate::failure::{Failure, flag};
 use crate::given_case::{at_setpoint, case_of};
 use crate::output::Output;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::{file, motion, number, style};
 
 /// Check a case and print it resolved.

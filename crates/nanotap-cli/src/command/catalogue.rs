@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::{given_case, number, page, style};
 
 /// List the levers and materials that a case can name.

@@ -10,7 +10,7 @@ use nanotap::files::{FileContents, FileList, Which, item, list};
 use crate::arguments::PlotArgument;
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::{number, page, style};
 
 /// Most files that are listed with their notes and images.

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::Table;
+use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{motion, progress, style};
 

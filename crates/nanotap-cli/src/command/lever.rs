@@ -10,7 +10,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::page::paragraph;
 use crate::request::Request;
-use crate::table::Table;
+use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{number, progress, style};
 

@@ -20,7 +20,7 @@ use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, number, progress, series, style};
 

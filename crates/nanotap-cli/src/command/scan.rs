@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::Table;
+use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 

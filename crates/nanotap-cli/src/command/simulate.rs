@@ -16,7 +16,7 @@ use crate::given_case::GivenCase;
 use crate::motion;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{number, progress, series, style};
 

@@ -90,7 +90,7 @@ fn lines(document: &Value, indent: &str) -> String {
     let fields = document.as_object().into_iter().flatten();
     let line = |(name, value): (&String, &Value)| match value {
         Value::Object(_) => format!("{indent}{name}:\n{}", lines(value, &format!("{indent}  "))),
-        _ => format!("{indent}{name}: {}\n", shown(value)),
+        _ => format!("{indent}{name}: {}\n", text_of(value)),
     };
     fields
         .filter(|(name, _)| !["case", "version"].contains(&name.as_str()))
@@ -98,7 +98,7 @@ fn lines(document: &Value, indent: &str) -> String {
         .collect()
 }
 
-fn shown(value: &Value) -> String {
+fn text_of(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Array(list) if list.len() > SHOWN => {

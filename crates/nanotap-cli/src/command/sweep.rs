@@ -12,8 +12,8 @@ use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::Table;
 use crate::targets;
+use crate::text_table::Table;
 
 /// Sweep one or two parameters, from any number of initial states.
 #[derive(Args, Debug)]

@@ -16,8 +16,8 @@ use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::Table;
 use crate::targets;
+use crate::text_table::Table;
 
 /// The operating window over two parameters: where there is only one motion, and where a second
 /// state, subharmonics or chaos threaten.

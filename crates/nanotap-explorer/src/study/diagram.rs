@@ -2,7 +2,7 @@
 
 use nanotap::case::Case;
 use nanotap::dataset::Store;
-use nanotap::figure::branch::{Shown, case_figure};
+use nanotap::figure::branch::{PlottedQuantity, case_figure};
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
 use nanotap::study::branch::{BranchReport, BranchStudy};
 use nanotap::study::sweep::Over;
@@ -121,7 +121,9 @@ impl Studied<'_> {
             let (report, options) = self.followed(&case, &over, values)?;
             let axis = Axis::of(&over);
             let figure = case_figure(&case, &report, None);
-            let shown = Shown::usual(&case).observable().map_or("", |o| o.name);
+            let shown = PlottedQuantity::usual(&case)
+                .observable()
+                .map_or("", |o| o.name);
             let heights = Height::of(&figure, &[shown]);
             let near = clicks::on_branches(&report, &axis, &heights, &case.units());
             self.hand(Stage {

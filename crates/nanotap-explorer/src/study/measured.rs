@@ -20,7 +20,7 @@ use nanotap_figures::{Axis as Axes, Colour, Figure, Markers, Panel};
 use serde_json::{Map, Value, json};
 
 use super::approach::{APPROACH, APPROACH_SHOWS, Approached};
-use super::{Found, Stage, Studied, object};
+use super::{NextStep, Stage, Studied, object};
 use crate::api_error::ApiError;
 use crate::clicks::Height;
 use crate::commands::CASE_FILE;
@@ -67,7 +67,7 @@ impl Studied<'_> {
             text: report.case_file.clone(),
         };
         let set = Case::parse(Some(found), &[]).map(|found| report::changes(&case, &found));
-        let found = Found {
+        let found = NextStep {
             set: set.ok(),
             take: "Use these values",
             file: report.case_file.clone(),
@@ -144,7 +144,7 @@ impl Studied<'_> {
             words,
             studies: &[(ReconstructStudy::NAME, named)],
             tables: vec![force_values(&report)],
-            found: Some(Found {
+            found: Some(NextStep {
                 set,
                 take: "Use as the sample's force table",
                 file: report.force_table().csv(),

@@ -95,12 +95,12 @@ struct Stage<'a> {
     scan: Option<String>,
     /// Tables that the page shows below the figure.
     tables: Vec<Value>,
-    found: Option<Found>,
+    found: Option<NextStep>,
 }
 
 /// A result of a study from which the user can go on.
 #[derive(Serialize)]
-struct Found {
+struct NextStep {
     /// The changes to the case that lead to this result, and the words of the button that applies
     /// them.
     set: Option<Map<String, Value>>,

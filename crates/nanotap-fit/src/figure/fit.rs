@@ -10,7 +10,7 @@ use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
 use nanotap_dataset::{Store, StoreError};
 use nanotap_motions::approach::Way;
-use nanotap_motions::figure::shown::Shown;
+use nanotap_motions::figure::plotted_quantity::PlottedQuantity;
 use nanotap_motions::frequency_modulation::Modulated;
 use nanotap_observe::frame::Row as _;
 use nanotap_observe::table::shown_phase;
@@ -173,8 +173,8 @@ fn groups(report: &FitReport) -> Vec<(String, Colour, Vec<&FittedRow>)> {
 
 fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
     let (x, along) = swept(report);
-    let shown = Shown::named(&column.observable);
-    let phase = shown.is_some_and(Shown::is_phase);
+    let shown = PlottedQuantity::named(&column.observable);
+    let phase = shown.is_some_and(PlottedQuantity::is_phase);
     let physical = report
         .rows
         .iter()

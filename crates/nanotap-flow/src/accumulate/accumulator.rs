@@ -9,7 +9,7 @@ use crate::functional::Functional;
 use crate::integral::{fourier_integral, integral, product_integral};
 use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::search::range::{Extend, Range, RangeWork, extend_by_certified_steps};
-use crate::search::table::Table;
+use crate::search::tabulated::Table;
 use crate::signal::Signal;
 use crate::simd::{self, LARGEST_ANGLE, layout};
 

@@ -6,7 +6,7 @@ use super::stretch::{Rates, pair_weights};
 use crate::functional::Functional;
 use crate::rate::Rate;
 use crate::regime::{Kernel, KernelFrame, ModalOutput};
-use crate::search::table::Table;
+use crate::search::tabulated::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};
 
 /// An output, the same in every regime or one per regime.

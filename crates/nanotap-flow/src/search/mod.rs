@@ -35,7 +35,7 @@ pub(crate) mod range;
 pub(crate) mod side_by_side;
 mod sign_changes;
 mod steps;
-pub(crate) mod table;
+pub(crate) mod tabulated;
 #[cfg(test)]
 mod tests;
 pub(crate) mod walk;

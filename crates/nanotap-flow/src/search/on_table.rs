@@ -3,7 +3,7 @@
 
 use super::interval::{Cubic, Interval};
 use super::near::Near;
-use super::table::{Followed, Table};
+use super::tabulated::{Followed, Table};
 use super::walk::Span;
 use super::{BySteps, Crossing, Start, Statistics};
 use crate::signal::Signal;

@@ -12,7 +12,7 @@
 
 use super::interval::{Interval, Point};
 use super::sign_changes;
-use super::table::{Followed, Grid, ROUNDING, Table};
+use super::tabulated::{Followed, Grid, ROUNDING, Table};
 use crate::regime::Kernel;
 use crate::signal::Signal;
 use crate::simd::{ComplexVector, Simd, Vector, WIDTH, Work, layout};

@@ -8,7 +8,7 @@
 //! by the quintic's Bernstein coefficients. Each lane then examines its own next open interval.
 
 use super::interval::Quintic;
-use super::table::Table;
+use super::tabulated::Table;
 use super::walk::{Bounds, coefficients};
 use crate::regime::Kernel;
 use crate::simd::{self, ComplexOctet, LANES, Octet, WIDTH, Wide, layout};
@@ -25,7 +25,7 @@ pub(crate) struct Signals<'a> {
     /// The amplitudes of all terms.
     pub(crate) amplitudes: &'a [ComplexOctet],
     /// Sums of the amplitudes' absolute values with the fine grid's
-    /// [`Weights`](super::table::Weights); `size` is that without weights.
+    /// [`Weights`](super::tabulated::Weights); `size` is that without weights.
     pub(crate) sums: [Octet; 4],
     pub(crate) size: Octet,
     /// Times up to which the search goes, from the start of the stretch.

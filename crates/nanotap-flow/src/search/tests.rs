@@ -2,7 +2,7 @@
 
 use super::on_table;
 use super::side_by_side::{self, Signals};
-use super::table::{Followed, Table};
+use super::tabulated::{Followed, Table};
 use super::{Crossing, Start, Statistics, first_crossing};
 use crate::regime::{Kernel, KernelFrame};
 use crate::signal::Signal;

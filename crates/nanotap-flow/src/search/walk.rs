@@ -17,7 +17,7 @@
 //! their amplitude. What is left open is for certified steps ([`steps`](super::steps)).
 
 use super::interval::{Interval, Point};
-use super::table::{Grid, ROUNDING, Table};
+use super::tabulated::{Grid, ROUNDING, Table};
 use crate::signal::{Amplitude, Signal};
 use crate::simd::{Lanes, Simd, Single, WIDTH};
 
@@ -36,7 +36,7 @@ pub(crate) struct Span {
 }
 
 /// Bounds for a signal on a grid, from the sums of its amplitudes with the grid's
-/// [`Weights`](super::table::Weights).
+/// [`Weights`](super::tabulated::Weights).
 #[derive(Clone, Copy)]
 pub(crate) struct Bounds<L: Lanes> {
     /// Lower limit of the Bernstein coefficients of a certified interval.

@@ -311,7 +311,7 @@ pub fn approach(
         options,
         speed,
     };
-    let mut found = quasistatic::found(&curve, &free, &distances, control)?;
+    let mut found = quasistatic::followed_curve(&curve, &free, &distances, control)?;
     if let Some(exact) = distances_in_si(case, options, [from, to])? {
         // The requested distances, not these in the model's units and back: curves of
         // different levers have the same ones.

@@ -17,7 +17,7 @@ use nanotap_error::Error;
 use nanotap_study::FreeMotion;
 
 /// What is reported of a curve.
-pub(super) struct Found {
+pub(super) struct FollowedCurve {
     pub(super) table: Vec<ApproachPoint>,
     pub(super) jumps: Vec<StateJump>,
     pub(super) coexisting: Vec<ApproachPoint>,
@@ -81,12 +81,12 @@ impl Ways {
 }
 
 /// The curve at these distances, from far to near.
-pub(super) fn found(
+pub(super) fn followed_curve(
     curve: &Curve<'_>,
     free: &FreeMotion,
     distances: &[f64],
     control: &Control<'_>,
-) -> Result<Found, Error> {
+) -> Result<FollowedCurve, Error> {
     let (case, options) = (curve.case, curve.options);
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let range = (to, from);
@@ -140,7 +140,7 @@ pub(super) fn found(
     let (branches, cut) = branches(curve, &mut sweep, range, control)?;
     let limits = [not_followed, not_compared, not_measured, cut].into_iter();
     let limits = limits.flatten();
-    Ok(Found {
+    Ok(FollowedCurve {
         jumps,
         hysteresis,
         compared,

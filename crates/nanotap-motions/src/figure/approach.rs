@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::approach::{ApproachReport, Way};
 use crate::branch::BifurcationReport;
 use crate::figure::branch::{
-    BranchMark, BranchPoint, Shown, natural_of, runs, scale_of, with_corners, with_marks,
+    BranchMark, BranchPoint, PlottedQuantity, natural_of, runs, scale_of, with_corners, with_marks,
 };
 use crate::frequency_modulation::Modulated;
 use nanotap_case::physical::Kind;
@@ -54,7 +54,7 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
         .into_iter()
         .chain(
             shown
-                .filter_map(Shown::named)
+                .filter_map(PlottedQuantity::named)
                 .map(|shown| ApproachPanel::of(report, shown, units, x_factor)),
         )
         .chain(of_drive(&["sader_jarvis_force"]));
@@ -198,8 +198,8 @@ impl ApproachPanel {
         }
     }
 
-    fn of(report: &ApproachReport, shown: Shown, units: &Units, x_factor: f64) -> Self {
-        let of = |shown: Shown, observables: &Observables| shown.of(observables, &[]);
+    fn of(report: &ApproachReport, shown: PlottedQuantity, units: &Units, x_factor: f64) -> Self {
+        let of = |shown: PlottedQuantity, observables: &Observables| shown.of(observables, &[]);
         let met = report.table.iter().filter_map(|p| p.observables.as_ref());
         let points = || report.branches.iter().flat_map(|b| &b.points);
         let largest = |f: &dyn Fn(&Observables) -> f64| {
@@ -208,7 +208,7 @@ impl ApproachPanel {
                 .map(|observables| f(observables).abs())
                 .fold(0.0, f64::max)
         };
-        let size = |shown: Shown| largest(&|observables| of(shown, observables));
+        let size = |shown: PlottedQuantity| largest(&|observables| of(shown, observables));
         let natural = natural_of(shown, size);
         let (label, factor) =
             shown.axis(true, |kind| units.si(kind), scale_of(size(shown), natural));

@@ -10,7 +10,7 @@ use nanotap_figures::{
 use serde::Deserialize;
 
 use crate::branch::{BifurcationReport, BranchReport, PointReport};
-pub use crate::figure::shown::Shown;
+pub use crate::figure::plotted_quantity::PlottedQuantity;
 use nanotap_case::physical::Kind;
 use nanotap_case::units::{Units, prefixed};
 use nanotap_case::{Case, Key};
@@ -59,14 +59,14 @@ impl ParameterAxis {
 }
 
 /// The figure of a case's branches against the parameter, in SI if the case is physical.
-pub fn case_figure(case: &Case, report: &BranchReport, shown: Option<Shown>) -> Figure {
+pub fn case_figure(case: &Case, report: &BranchReport, shown: Option<PlottedQuantity>) -> Figure {
     let size = report.from.abs().max(report.to.abs());
     let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
         (loci.key, loci.range[0].abs().max(loci.range[1].abs()))
     });
     let axes = [(report.key, size), (second, reach)]
         .map(|(key, size)| ParameterAxis::of_case(case, key, size));
-    let shown = shown.unwrap_or_else(|| Shown::usual(case));
+    let shown = shown.unwrap_or_else(|| PlottedQuantity::usual(case));
     let beam = case.oscillator().is_none();
     branch_figure(report, shown, beam, &axes, &case.units())
 }
@@ -109,14 +109,14 @@ pub(crate) fn with_marks(
 /// panel the bifurcation curves in two parameters, if they were traced.
 pub fn branch_figure(
     report: &BranchReport,
-    shown: Shown,
+    shown: PlottedQuantity,
     beam: bool,
     axes: &[ParameterAxis; 2],
     units: &Units,
 ) -> Figure {
     // Model units may vary with physical quantities: SI then.
     let si = report.points.iter().any(|p| p.physical.is_some());
-    let of = |shown: Shown,
+    let of = |shown: PlottedQuantity,
               model: &Observables,
               physical: Option<&PhysicalMotion>,
               multipliers: &[[f64; 2]]| {
@@ -192,11 +192,14 @@ pub fn branch_figure(
 
 /// Natural size of a quantity: for the dissipation the work of the peak force over the amplitude,
 /// compared with which rounding is negligible; unknown for others, and of exact zeros.
-pub fn natural_of(shown: Shown, largest: impl Fn(Shown) -> f64) -> Option<f64> {
-    if shown != Shown::named("dissipation")? || largest(shown) == 0.0 {
+pub fn natural_of(shown: PlottedQuantity, largest: impl Fn(PlottedQuantity) -> f64) -> Option<f64> {
+    if shown != PlottedQuantity::named("dissipation")? || largest(shown) == 0.0 {
         return None;
     }
-    Some(largest(Shown::named("first_harmonic")?) * largest(Shown::named("peak_force")?))
+    Some(
+        largest(PlottedQuantity::named("first_harmonic")?)
+            * largest(PlottedQuantity::named("peak_force")?),
+    )
 }
 
 /// The size that determines the unit: that of the data or, if these are rounding, the natural one.

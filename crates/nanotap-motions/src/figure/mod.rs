@@ -6,4 +6,4 @@ pub mod branch;
 pub mod contact;
 pub mod motion;
 pub mod panels;
-pub mod shown;
+pub mod plotted_quantity;

@@ -175,7 +175,7 @@ impl<'a> HeldWalk<'a> {
     /// Where the last two orbits point to.
     fn foreseen(&self, gap: f64) -> Driven {
         let Some(known) = &self.last else {
-            return Driven::nothing();
+            return Driven::empty();
         };
         let (at, last) = (known.0, self.resized(known, gap));
         let Some(known) = &self.before else {
@@ -236,7 +236,7 @@ fn broken() -> Error {
 }
 
 impl Driven {
-    fn nothing() -> Self {
+    fn empty() -> Self {
         Self {
             frequency: 1.0,
             strength: 1.0,

@@ -20,12 +20,12 @@
 //! base is left out. It adds `(f / f0)²` of the amplitude at the frequency `f` of a cosine.
 
 mod fits;
-mod lever;
 mod path;
 mod report;
 mod rest;
 mod run;
 mod statics;
+mod stretches;
 
 use nanotap_dynamics::Control;
 

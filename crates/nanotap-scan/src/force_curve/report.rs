@@ -7,7 +7,7 @@ use super::Way;
 use super::fits::{ContactFit, fits};
 use super::path::Plan;
 use super::run::Run;
-use super::statics::{Rest, StaticCurve, StaticsFound};
+use super::statics::{BranchesAndJumps, Rest, StaticCurve};
 use crate::moving_lever::Signals;
 use nanotap_case::key::Key;
 use nanotap_case::physical::force::SampleForce;
@@ -232,7 +232,7 @@ const FAST: f64 = 0.1;
 const STIFFER: f64 = 1.01;
 
 /// Creates the report of a run.
-pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> ForceCurveReport {
+pub(super) fn report(plan: &Plan<'_>, statics: &BranchesAndJumps, run: &Run) -> ForceCurveReport {
     let scales = &plan.view.scales;
     let rest = |rest: &Rest| StaticPoint {
         distance: rest.distance * scales.length,

@@ -97,7 +97,7 @@ impl RestLever {
     /// two distances.
     pub fn pull_off(&self, between: [f64; 2]) -> Option<StableRest> {
         let [near, far] = between.map(|z| z / self.length);
-        let found = self.statics.found(near, far).pull_off;
+        let found = self.statics.branches_and_jumps(near, far).pull_off;
         // At an end of the range the force may fall further beyond it.
         let found = found.filter(|rest| near < rest.distance && rest.distance < far);
         found.map(|rest| self.in_si(rest))

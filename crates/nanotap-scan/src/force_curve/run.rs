@@ -6,8 +6,8 @@ use nanotap_dynamics::Control;
 use nanotap_volterra::ForceSums;
 
 use super::Way;
-use super::lever::Lever;
 use super::path::{Plan, Stretch};
+use super::stretches::Lever;
 use crate::moving_lever::{Signals, Sums};
 use nanotap_error::Error;
 use nanotap_model::MotionError;

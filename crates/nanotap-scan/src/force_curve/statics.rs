@@ -49,7 +49,7 @@ pub(super) struct Jump {
 
 /// Branches and jumps between two distances.
 #[derive(Clone, Debug)]
-pub(super) struct StaticsFound {
+pub(super) struct BranchesAndJumps {
     pub(super) pieces: Vec<Piece>,
     pub(super) jumps: Vec<Jump>,
     /// Lowest force in contact on the way back, up to the first jump.
@@ -228,7 +228,7 @@ impl StaticCurve {
 
     /// Branches and jumps of a lever that comes from the distance `far`, turns at `near` and goes
     /// back.
-    pub(super) fn found(&self, near: f64, far: f64) -> StaticsFound {
+    pub(super) fn branches_and_jumps(&self, near: f64, far: f64) -> BranchesAndJumps {
         let pieces = self.pieces(near, far);
         let mut jumps = Vec::new();
         let mut pull_off = None;
@@ -252,7 +252,7 @@ impl StaticCurve {
                 jumps.extend(back);
             }
         }
-        StaticsFound {
+        BranchesAndJumps {
             pieces,
             jumps,
             pull_off,
@@ -643,6 +643,7 @@ impl LawRests {
 }
 
 /// The static branches of a plan.
-pub(super) fn statics(plan: &Plan<'_>) -> StaticsFound {
-    plan.statics.found(plan.path.to, plan.path.from)
+pub(super) fn statics(plan: &Plan<'_>) -> BranchesAndJumps {
+    plan.statics
+        .branches_and_jumps(plan.path.to, plan.path.from)
 }

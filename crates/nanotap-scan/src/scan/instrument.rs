@@ -5,10 +5,10 @@ use nanotap_flow::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::feedback::{Controller, LockIn, Scanner};
-use super::lever::{Lever, PeriodSignals};
 use super::options::{Method, Mode};
 use super::plan::Plan;
 use super::quasi_static::SteadyLever;
+use super::tapping_period::{Lever, PeriodSignals};
 use nanotap_error::Error;
 
 /// Force that governs the motion of a drive period.

@@ -13,6 +13,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
+use super::frames::centres;
 use super::instrument::Interaction;
 use super::options::ScanOptions;
 use super::plan::Plan;
@@ -22,7 +23,6 @@ use super::report::{
     PixelRow, ScanReport,
 };
 use super::run::{Recorded, Settled};
-use super::table::centres;
 use super::{ScanStudy, header, lever_memory, with_lines};
 use crate::figure::scan::scan_figure;
 use nanotap_case::Case;

@@ -9,10 +9,10 @@ use nanotap_flow::Complex;
 
 use super::feedback::oscillator_map;
 use super::instrument::{Instrument, Interaction};
-use super::lever::{Lever, PeriodSignals};
 use super::options::Mode;
 use super::plan::Plan;
 use super::report::LoopReport;
+use super::tapping_period::{Lever, PeriodSignals};
 
 /// Newton steps to the steady motion at the setpoint.
 const MAX_ITERATIONS: usize = 40;

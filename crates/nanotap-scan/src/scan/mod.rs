@@ -13,9 +13,9 @@
 //!    late, within slew rate and range; `s` stays where the command is limited.
 
 mod feedback;
+mod frames;
 mod image;
 mod instrument;
-mod lever;
 mod lines;
 mod loop_response;
 pub mod options;
@@ -26,7 +26,7 @@ mod recorder;
 pub mod report;
 mod run;
 mod state_tracker;
-mod table;
+mod tapping_period;
 mod verdict;
 
 use nanotap_dynamics::Control;

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use super::frames::centres;
 use super::image::HeightImage;
 use super::options::{Feature, MAX_FEATURES, ProfileOptions};
-use super::table::centres;
 use nanotap_case::Case;
 use nanotap_case::input::{self, MAX_TABLE_BYTES, Origin};
 use nanotap_case::physical::Kind;

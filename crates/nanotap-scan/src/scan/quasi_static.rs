@@ -4,7 +4,7 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 
-use super::lever::{Lever, PeriodSignals};
+use super::tapping_period::{Lever, PeriodSignals};
 use nanotap_model::MotionError;
 
 /// Number of distances per free amplitude at which motions are stored.

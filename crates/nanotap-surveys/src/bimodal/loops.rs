@@ -247,7 +247,7 @@ impl Loops {
                     return Ok(here);
                 }
                 if fresh {
-                    return Err(nothing());
+                    return Err(no_motion_near());
                 }
                 continue;
             }
@@ -262,7 +262,7 @@ impl Loops {
         if residual.amax() <= ACCEPTED {
             return Ok(here);
         }
-        Err(nothing())
+        Err(no_motion_near())
     }
 
     /// Computes the Jacobian of the residual by finite differences.
@@ -298,7 +298,7 @@ impl Loops {
     }
 }
 
-fn nothing() -> Error {
+fn no_motion_near() -> Error {
     Error::numerics("no motion near has the amplitudes and phases that the loops hold")
 }
 

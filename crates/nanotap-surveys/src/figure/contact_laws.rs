@@ -7,7 +7,7 @@ use crate::contact_laws::{Comparison, SampleMotion};
 use nanotap_case::physical::Kind;
 use nanotap_case::units::Units;
 use nanotap_motions::branch::PointReport;
-use nanotap_motions::figure::branch::{Shown, runs};
+use nanotap_motions::figure::branch::{PlottedQuantity, runs};
 
 /// Loops of force and indentation under each law; if branches were followed, also dissipation and
 /// amplitude against the drive frequency, dashed where unstable.
@@ -90,7 +90,7 @@ fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
 }
 
 fn followed_panel(comparison: &Comparison, shown: &str, units: &Units) -> Panel {
-    let shown = Shown::named(shown).unwrap_or(Shown::SpectralRadius);
+    let shown = PlottedQuantity::named(shown).unwrap_or(PlottedQuantity::SpectralRadius);
     let value = |p: &PointReport| shown.of(&p.observables, &p.multipliers);
     let points = |s: &SampleMotion| -> Vec<PointReport> {
         s.branch

@@ -13,7 +13,7 @@ use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
 use nanotap_dataset::{Coordinate, Store, StoreError, Values};
 use nanotap_motions::figure::branch::{natural_of, scale_of};
-use nanotap_motions::figure::shown::Shown;
+use nanotap_motions::figure::plotted_quantity::PlottedQuantity;
 use nanotap_motions::simulate::Classification;
 use nanotap_observe::table::shown_phase;
 
@@ -435,14 +435,14 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
         .height(195.0)
         .with(motions.title("motions"));
     let mut values = Vec::new();
-    for shown in SHOWN.into_iter().filter_map(Shown::named) {
+    for shown in SHOWN.into_iter().filter_map(PlottedQuantity::named) {
         values.push((shown, of_first_start(store, shown)?));
     }
     let size = |values: &[f64]| {
         let known = values.iter().filter(|v| v.is_finite());
         known.fold(0.0, |size: f64, v| size.max(v.abs()))
     };
-    let largest = |wanted: Shown| {
+    let largest = |wanted: PlottedQuantity| {
         let found = values.iter().find(|(shown, _)| *shown == wanted);
         found.map_or(0.0, |(_, (of, _))| size(of))
     };
@@ -462,7 +462,7 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
 
 /// A quantity of the motions of the first initial state over two parameters, row by row, and
 /// whether it is in SI.
-fn of_first_start(store: &Store, shown: Shown) -> Result<(Vec<f64>, bool), StoreError> {
+fn of_first_start(store: &Store, shown: PlottedQuantity) -> Result<(Vec<f64>, bool), StoreError> {
     let schema = store.schema();
     let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
     let mut all = vec![f64::NAN; rows * columns];

@@ -1,7 +1,9 @@
 //! The figures: a description of each study's report, which `nanotap-figures` draws.
 
 pub use nanotap_fit::figure::{files, fit, reconstruct};
-pub use nanotap_motions::figure::{approach, attractors, branch, contact, motion, panels, shown};
+pub use nanotap_motions::figure::{
+    approach, attractors, branch, contact, motion, panels, plotted_quantity,
+};
 pub use nanotap_scan::figure::{force_curve, scan};
 pub use nanotap_surveys::figure::{
     basin, bimodal, contact_laws, convergence, modes, sweep, window,

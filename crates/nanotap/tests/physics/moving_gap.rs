@@ -4,9 +4,9 @@ use nanotap::case::{Case, MovingGap};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::model_map::ModelMap;
-use nanotap_dynamics::StroboscopicMap as _;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::{ObservableSet, measure};
+use nanotap_dynamics::StroboscopicMap as _;
 
 /// Every contact law, a nonlinear law, and both stops.
 fn cases() -> Vec<Case> {

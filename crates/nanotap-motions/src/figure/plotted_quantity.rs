@@ -11,7 +11,7 @@ use nanotap_observe::{Dimension, Observable, Observables};
 /// The quantity of an orbit that is drawn: an observable that is one number, or the largest
 /// multiplier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shown {
+pub enum PlottedQuantity {
     /// An observable that is one number.
     Observable(&'static Observable),
     /// Largest modulus of a multiplier, dimensionless.
@@ -20,7 +20,7 @@ pub enum Shown {
 
 const SPECTRAL_RADIUS: &str = "spectral_radius";
 
-impl Shown {
+impl PlottedQuantity {
     /// The choice of this name.
     pub fn named(name: &str) -> Option<Self> {
         if name == SPECTRAL_RADIUS {

@@ -74,8 +74,10 @@ pub struct CantileverDocument {
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PhysicalSummary {
     /// Spring constant at the tip, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub k: f64,
     /// First resonance, with the tip, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub f0: f64,
     /// Quality factor of the first free resonance, dimensionless.
     #[serde(rename = "Q")]
@@ -87,12 +89,15 @@ pub struct PhysicalSummary {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mode: Vec<LeverModeDocument>,
     /// Mass of the tip, kg.
+    #[schemars(extend("x-unit" = "kg"))]
     pub tip_mass: f64,
     /// Amplitude of the base, m, or of the force on the lever, N.
     pub drive_amplitude: f64,
     /// Frequency of the first tone of the drive, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub drive_frequency: f64,
     /// Free amplitude of the tip, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub free_amplitude: f64,
     /// Phase lag of the free deflection, degrees.
     pub free_phase_degrees: f64,
@@ -119,6 +124,7 @@ pub struct PhysicalSummary {
     /// Setpoint amplitude as a fraction of the free amplitude; `None` without such a setpoint.
     pub setpoint: Option<f64>,
     /// Contact stiffness K₁ of the sample, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub contact_stiffness: f64,
     /// Contact damping C₁ of the sample, N s/m.
     pub contact_damping: f64,
@@ -151,6 +157,7 @@ pub struct PhysicalSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_unit: Option<f64>,
     /// The model's unit of time, s.
+    #[schemars(extend("x-unit" = "s"))]
     pub time_unit: f64,
     /// The model's unit of force, N; `None` while the distance is left to a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -164,8 +171,10 @@ pub struct PhysicalSummary {
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct LeverModeDocument {
     /// Undamped frequency of the free mode, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub f: f64,
     /// Stiffness at the tip, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub k: f64,
     /// Quality factor of the free mode, dimensionless.
     #[serde(rename = "Q")]
@@ -193,8 +202,10 @@ impl LeverModeDocument {
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct DynamicModulus {
     /// Storage modulus E' at the drive frequency, Pa.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub storage_modulus: f64,
     /// Loss modulus E'' at the drive frequency, Pa.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub loss_modulus: f64,
     /// Loss tangent tan δ = E''/E', dimensionless.
     pub loss_tangent: f64,

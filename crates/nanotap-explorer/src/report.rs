@@ -104,7 +104,7 @@ struct Field<'a> {
     node: &'a Value,
     /// The first sentence of its description.
     words: String,
-    /// What it measures, if that sentence ends with a unit.
+    /// What it measures, by its declared unit.
     kind: Option<Kind>,
 }
 
@@ -118,17 +118,7 @@ impl<'a> Field<'a> {
         let text = text.join(" ");
         let words = text.split(". ").next().unwrap_or_default();
         let words = words.trim_end_matches('.').to_owned();
-        let ends = |unit: &str| {
-            let ends = [format!(", {unit}"), format!(" in {unit}")];
-            ends.iter().any(|end| words.ends_with(end))
-        };
-        // Declared with the column; else the unit ends the sentence.
-        let kind = match own["x-unit"].as_str() {
-            Some(unit) => Kind::of_si_unit(unit),
-            None => Kind::ALL
-                .into_iter()
-                .find(|kind| *kind != Kind::Number && ends(kind.si_unit())),
-        };
+        let kind = own["x-unit"].as_str().and_then(Kind::of_si_unit);
         Self { node, words, kind }
     }
 

@@ -39,8 +39,10 @@ pub struct FileContents {
     /// Columns and rows of the grid of its map.
     pub grid: Option<[usize; 2]>,
     /// Width and height of that grid, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub grid_size: Option<[f64; 2]>,
     /// Spring constant of the first curve, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub spring_constant: Option<f64>,
     /// Sensitivity (InvOLS) of the first curve, m/V.
     pub sensitivity: Option<f64>,
@@ -68,6 +70,7 @@ pub struct SegmentContents {
     /// How many points each channel has.
     pub points: usize,
     /// Duration, s.
+    #[schemars(extend("x-unit" = "s"))]
     pub duration: Option<f64>,
     /// Channels, each with its unit as in `height (m)`.
     pub channels: Vec<String>,
@@ -83,6 +86,7 @@ pub struct ImageContents {
     /// Points in a line, and lines.
     pub shape: [usize; 2],
     /// Width and height, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub size: Option<[f64; 2]>,
 }
 
@@ -96,6 +100,7 @@ pub struct SpectrumContents {
     /// How many frequencies it has.
     pub points: usize,
     /// Largest frequency, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub largest_frequency: Option<f64>,
 }
 

@@ -53,6 +53,7 @@ pub struct SetpointSolution {
     /// The distance, in the model's unit of length.
     pub gap: f64,
     /// Distance between tip and sample at rest, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub zc: f64,
     /// Period of the orbit, in drive periods.
     pub period: usize,
@@ -95,6 +96,7 @@ pub struct SetpointState {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SetpointDrive {
     /// Frequency of the drive, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: f64,
     /// Strength of the drive: the force in N, or the amplitude of a driven base in m.
     pub strength: f64,
@@ -115,6 +117,7 @@ pub struct SetpointReport {
     /// Amplitude A at the setpoint over the free amplitude A₀, dimensionless.
     pub ratio: f64,
     /// Amplitude A at the setpoint, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,
     /// All distances at which an orbit is at the setpoint, from far to near.
     pub solutions: Vec<SetpointSolution>,

@@ -131,6 +131,7 @@ pub struct Knocks {
     /// time.
     pub largest_tried: f64,
     /// Largest change of the tip's speed that was tried in a physical case, m/s.
+    #[schemars(extend("x-unit" = "m/s"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_tried_in_si: Option<f64>,
 }

@@ -53,16 +53,19 @@ pub struct PhysicalHarmonic {
     /// Frequency as a multiple of the drive frequency, dimensionless.
     pub order: f64,
     /// Frequency of the component, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: f64,
     /// With several tones, the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this
     /// frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub product: Option<Vec<i32>>,
     /// Amplitude of the tip deflection, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub tip: f64,
     /// Phase lag behind sin(order · ωt), degrees in (−180, 180].
     pub tip_phase: f64,
     /// Amplitude of the force, N.
+    #[schemars(extend("x-unit" = "N"))]
     pub force: f64,
     /// Phase lag of the force, degrees in (−180, 180].
     pub force_phase: f64,

@@ -52,8 +52,10 @@ pub struct LeverRow {
     /// Name of the lever in the catalogue.
     pub lever: String,
     /// Spring constant, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub k: f64,
     /// Frequency of the free resonance, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub f0: f64,
     /// Quality factor of the free resonance, dimensionless.
     #[serde(rename = "Q")]
@@ -62,8 +64,10 @@ pub struct LeverRow {
     #[serde(rename = "Q_air", skip_serializing_if = "Option::is_none")]
     pub quality_factor_in_air: Option<f64>,
     /// Radius of the tip, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub tip_radius: Option<f64>,
     /// Time constant Q/(π f0) of the amplitude, s.
+    #[schemars(extend("x-unit" = "s"))]
     pub time_constant: f64,
     /// The motion at the setpoint, if it is reached.
     #[serde(flatten)]
@@ -81,6 +85,7 @@ pub struct LeverRow {
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LeverMotion {
     /// Distance at which the setpoint is reached, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub distance: f64,
     /// Whether the mean force attracts or repels: `attractive` or `repulsive`.
     pub regime: &'static str,
@@ -150,6 +155,7 @@ const NO_DIMENSIONS: &str =
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LeverReport {
     /// Free amplitude of every lever, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub free_amplitude: f64,
     /// Drive frequency over the free resonance of each lever, dimensionless.
     pub frequency_ratio: f64,

@@ -7,10 +7,13 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct BeamGeometry {
     /// Length L of the beam, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub length: f64,
     /// Width b of the beam, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub width: f64,
     /// Thickness h in the direction of bending, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub thickness: f64,
 }
 

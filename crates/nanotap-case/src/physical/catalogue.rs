@@ -39,8 +39,10 @@ pub struct Lever {
     /// Alternative names of the lever.
     pub aliases: Vec<String>,
     /// Spring constant of the lever, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub k: f64,
     /// First free resonance with the tip, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub f0: f64,
     /// Dimensions of the beam, m; `None` if they are unknown.
     #[serde(flatten)]

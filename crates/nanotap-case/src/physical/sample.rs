@@ -60,10 +60,13 @@ const STIFFNESS_IN_DOUBT: f64 = 0.25;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct HertzMismatch {
     /// Indentation of the linearisation, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub assumed_indentation: f64,
     /// Stiffness at that indentation, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub assumed_stiffness: f64,
     /// Stiffness at the largest indentation of the motion, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub stiffness: f64,
 }
 

@@ -43,13 +43,16 @@ pub struct ContactFit {
     /// Contact model that is fitted.
     pub model: ContactModel,
     /// Reduced modulus E* of tip and sample, Pa.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub reduced_modulus: f64,
     /// Young's modulus of the sample, Pa, with the case's Poisson ratio and tip; None if these are
     /// unknown.
     pub modulus: Option<f64>,
     /// Separation at which the indentation begins, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub contact_point: f64,
     /// Root mean square of the separation minus that of the fit, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub residual: f64,
     /// Number of points of the curve that are fitted.
     pub points: usize,

@@ -58,13 +58,16 @@ rows! {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct StaticPoint {
     /// Distance z between tip and undeformed surface with the lever at deflection 0, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub distance: f64,
     /// Separation of tip and undeformed surface, z + deflection, m; negative: minus the
     /// indentation.
     pub separation: f64,
     /// Deflection of the tip, positive away from the sample, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub deflection: f64,
     /// Force of the sample on the tip, positive if it repels, N.
+    #[schemars(extend("x-unit" = "N"))]
     pub force: f64,
 }
 
@@ -135,22 +138,29 @@ pub struct ForceCurveReport {
     /// Waveform of the distance against time.
     pub waveform: Waveform,
     /// Distance at the start, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub from: f64,
     /// Distance at which the approach turns, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub to: f64,
     /// Speed of the ramp, or largest speed of the cosine, m/s.
+    #[schemars(extend("x-unit" = "m/s"))]
     pub speed: f64,
     /// Duration of the cycle, s.
+    #[schemars(extend("x-unit" = "s"))]
     pub duration: f64,
     /// Whether the lever is driven.
     pub driven: bool,
     /// Number of stretches of the exact flow.
     pub stretches: usize,
     /// Adhesion force: minus the lowest force of the retract, N.
+    #[schemars(extend("x-unit" = "N"))]
     pub adhesion: f64,
     /// Distance at which the tip first touches on the approach, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub snap_in: Option<f64>,
     /// Distance at which the tip last touches on the retract, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub pull_off: Option<f64>,
     /// Largest force of the sample on the tip, N; 0 if it never repels.
     pub peak_force: f64,

@@ -305,6 +305,7 @@ pub struct ImageCause {
     /// Number of the drive period in which it starts, from the start of settling.
     pub k: Option<usize>,
     /// Position along the line where it starts, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub x: Option<f64>,
     /// Number of the drive period with which it ends; `null` if it lasts.
     pub until_k: Option<usize>,
@@ -324,6 +325,7 @@ pub struct ImageCause {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LoopReport {
     /// Distance at which the motion has the setpoint amplitude, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub distance: f64,
     /// Force that governs the motion there.
     pub state: Interaction,
@@ -360,32 +362,40 @@ pub struct ScanReport {
     /// Fraction of the drive periods that was computed exactly, 0 to 1.
     pub exact_share: f64,
     /// Extent along and across the lines, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub size: [f64; 2],
     /// Number of drive periods of a line in one direction.
     pub periods_per_line: usize,
     /// Number of drive periods of the scan, with settling.
     pub total_periods: usize,
     /// Lines a second, trace and retrace together, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub line_rate: f64,
     /// Speed of the tip along a line, m/s.
+    #[schemars(extend("x-unit" = "m/s"))]
     pub speed: f64,
     /// Amplitude of the free lever at the drive's frequency, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub free_amplitude: f64,
     /// Amplitude that the feedback keeps, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub setpoint_amplitude: f64,
     /// Height of the lever's base at the start, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub z0: f64,
     /// Integral gain of the feedback, 1/s.
     pub integral_gain: f64,
     /// Whether each line settled anew, so that lines are independent.
     pub independent_lines: bool,
     /// Largest force of the sample on the tip in the scan, N.
+    #[schemars(extend("x-unit" = "N"))]
     pub peak_force_max: f64,
     /// Signals of the drive periods that the options list.
     pub periods: Vec<ListedPeriod>,
     /// Statistics of each line and direction.
     pub lines: Vec<LineStatistics>,
     /// Root mean square of the difference between the heights of trace and retrace, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub trace_retrace_rms: Option<f64>,
     /// Image of the trace: lines in the direction of rising positions.
     pub trace: Channels,

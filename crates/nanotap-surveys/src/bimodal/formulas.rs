@@ -25,6 +25,7 @@ pub struct ToneEstimates {
     /// Virial of the tip–sample force in the tone, J; negative where the force repels.
     pub virial: f64,
     /// Energy that the force takes from the tone in one of its periods, J.
+    #[schemars(extend("x-unit" = "J"))]
     #[serde(rename = "E_dis")]
     pub dissipation: f64,
 }
@@ -33,8 +34,10 @@ pub struct ToneEstimates {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Estimates {
     /// Reduced modulus E* in Pa.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub reduced_modulus: Option<f64>,
     /// Largest indentation of the sample, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub indentation: Option<f64>,
     /// Loss tangent tan δ from amplitude and phase of the first tone, dimensionless; None unless
     /// its drive is at resonance.

@@ -106,10 +106,12 @@ rows! {
         /// Frequency of the drive, Hz.
         pub frequency: f64 = Frequency, "frequency", "frequency", Prefixed(7),
         /// Strength of the drive: its force in N, or a driven base's amplitude in m.
+        #[schemars(extend("x-unit" = "m"))]
         pub drive_strength: f64,
         /// Stiffness of the mode at the tip in N/m.
         pub stiffness: f64 = Si(Kind::Stiffness), "stiffness of the mode", "stiffness", Prefixed(4),
         /// Frequency at which the free lever lags by the phase of the loop, by default 90°, in Hz.
+        #[schemars(extend("x-unit" = "Hz"))]
         pub resonance: f64,
     }
 }
@@ -125,10 +127,12 @@ rows! {
         /// Phase lag behind the drive in degrees.
         pub phase: f64 = Angle, "phase lag", "lag (°)", Decimals(2),
         /// Frequency of the drive, Hz.
+        #[schemars(extend("x-unit" = "Hz"))]
         pub frequency: f64,
         /// Frequency less that of the free lever in Hz.
         pub frequency_shift: f64 = Frequency, "frequency shift $Δf$", "Δf", Prefixed(4),
         /// Strength of the drive: its force in N, or a driven base's amplitude in m.
+        #[schemars(extend("x-unit" = "m"))]
         pub drive_strength: f64,
         /// Strength of the drive over that of the free lever, dimensionless.
         pub drive_ratio: f64 = Number, "drive / free drive", "drive", Digits(4),
@@ -148,18 +152,22 @@ rows! {
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
     pub struct BimodalPoint {
         /// Distance of the tip at rest from the sample in m.
+        #[schemars(extend("x-unit" = "m"))]
         pub zc: f64,
         /// The readings of both tones.
         pub tones: [ToneReading; 2],
         /// Time mean of the force on the tip in N.
+        #[schemars(extend("x-unit" = "N"))]
         pub mean_force: f64,
         /// Largest force on the tip in N.
         #[serde(rename = "F_max")]
         pub peak_force: f64 = Force, "peak force $F_{max}$", "F_max", Prefixed(4),
         /// Lowest force on the tip in N.
+        #[schemars(extend("x-unit" = "N"))]
         #[serde(rename = "F_min")]
         pub least_force: f64,
         /// Least height of the tip over the undeformed surface in m.
+        #[schemars(extend("x-unit" = "m"))]
         pub closest: f64,
         /// Factor by which a small disturbance grows in a period of the first tone at constant drives.
         pub growth: f64 = Number, "growth of a small disturbance",
@@ -175,8 +183,10 @@ rows! {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BimodalJump {
     /// Last distance of the motion before the jump, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub from: f64,
     /// First distance of the motion after the jump, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub to: f64,
 }
 

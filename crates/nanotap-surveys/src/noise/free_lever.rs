@@ -26,11 +26,13 @@ const OPTICAL: f64 = 0.817;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Calibrations {
     /// Spring constant of the case, static at the tip, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub k: f64,
     /// Spring constant by the thermal method, N/m: from the first mode's peak, read by an optical
     /// lever that was calibrated against a hard surface, with the factor 0.817 of a uniform beam.
     pub thermal: f64,
     /// Spring constant by the thermal method without this factor, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub thermal_without_factor: f64,
     /// Spring constant by Sader's method from width, length, f0 and Q in air, N/m; None if the
     /// dimensions are unknown or another fluid is given.
@@ -43,6 +45,7 @@ pub struct ThermalSpectrum {
     /// Frequencies in Hz, dense at the resonances.
     pub frequency: Vec<f64>,
     /// One-sided density of the tip deflection in m²/Hz.
+    #[schemars(extend("x-unit" = "m²/Hz"))]
     pub density: Vec<f64>,
 }
 

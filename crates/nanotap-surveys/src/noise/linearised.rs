@@ -40,8 +40,10 @@ const LOWEST: f64 = 0.02;
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ReadingSpectrum {
     /// Distances from the drive's frequency, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: Vec<f64>,
     /// Density of the amplitude at these frequencies, m²/Hz.
+    #[schemars(extend("x-unit" = "m²/Hz"))]
     pub amplitude: Vec<f64>,
     /// Density of the phase at these frequencies, degrees²/Hz.
     pub phase: Vec<f64>,

@@ -44,38 +44,48 @@ pub const BOLTZMANN: f64 = 1.380_649e-23;
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NoiseReport {
     /// Temperature of the lever and its surroundings, K.
+    #[schemars(extend("x-unit" = "K"))]
     pub temperature: f64,
     /// Time constant of the lock-in amplifier's first-order filter in s.
+    #[schemars(extend("x-unit" = "s"))]
     pub time_constant: f64,
     /// Noise bandwidth of this filter in Hz, 1 over four time constants.
     pub bandwidth: f64,
     /// Root mean square of the tip deflection of the lever alone, without a drive, in m.
+    #[schemars(extend("x-unit" = "m"))]
     pub thermal_rms: f64,
     /// Period of the orbit in drive periods.
     pub period: usize,
     /// Amplitude that the lock-in amplifier reads, in m.
+    #[schemars(extend("x-unit" = "m"))]
     #[serde(rename = "A")]
     pub amplitude: f64,
     /// Root mean square of the noise of this amplitude in m.
+    #[schemars(extend("x-unit" = "m"))]
     pub amplitude_rms: f64,
     /// Phase that the lock-in amplifier reads, behind the drive, in degrees.
     pub phase: f64,
     /// Root mean square of the noise of this phase in degrees.
     pub phase_rms: f64,
     /// Frequency of the drive, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: f64,
     /// Root mean square of the noise with which frequency modulation reads the frequency at this
     /// working point, in the bandwidth, while it holds the amplitude and the phase, in Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency_rms: f64,
     /// Root mean square of the noise of the amplitude of the free lever under the same drive, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub free_amplitude_rms: f64,
     /// Root mean square of the noise of the phase of the free lever under the same drive, degrees.
     pub free_phase_rms: f64,
     /// Root mean square of the noise with which frequency modulation reads the free lever's frequency,
     /// in the bandwidth and at the amplitude of this drive, in Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub free_frequency_rms: f64,
     /// Force gradient that shifts the phase of the free lever by the root mean square of its noise,
     /// N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub force_gradient_min: f64,
     /// The unstable orbit on the boundary of the basin, if one was found.
     pub saddle: Option<SaddleDistance>,

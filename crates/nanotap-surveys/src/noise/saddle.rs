@@ -37,6 +37,7 @@ pub struct SaddleDistance {
     /// Distance of the boundary of the basin in standard deviations of the noise, dimensionless.
     pub deviations: f64,
     /// Amplitude of the unstable orbit in m.
+    #[schemars(extend("x-unit" = "m"))]
     #[serde(rename = "A")]
     pub amplitude: f64,
     /// Phase of the unstable orbit behind the drive, in degrees.

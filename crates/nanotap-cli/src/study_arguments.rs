@@ -59,6 +59,11 @@ impl<S: Study> StudyArguments<S> {
     pub(crate) fn write(&self, case: &Case, report: &S::Report) -> Result<(), Failure> {
         let table = || S::frames(case, report).first().map(Frame::csv);
         self.out.write(|| table().unwrap_or_default())?;
+        self.draw(case, report)
+    }
+
+    /// Draws the figure of a report where `--plot` wants it.
+    pub(crate) fn draw(&self, case: &Case, report: &S::Report) -> Result<(), Failure> {
         match &self.plot.plot {
             Some(path) => {
                 S::figure(case, report).map_or(Ok(()), |figure| file::draw(path, &figure))

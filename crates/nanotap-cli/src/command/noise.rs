@@ -2,9 +2,10 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
+use nanotap::figure::noise::noise_figure;
 use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy};
 
-use crate::arguments::{CaseArguments, OutArgument};
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -26,14 +27,18 @@ pub(crate) struct Arguments {
     /// Writes the free lever's thermal spectrum
     #[command(flatten)]
     out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
     arguments.out.check()?;
+    arguments.plot.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
     let report = progress::study::<NoiseStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| report.spectrum.table().csv())?;
+    arguments.plot.draw(|| noise_figure(&report))?;
     output.notes(&report.notes);
     output.study(&case, &report, |report| text(&case, report))
 }

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
-use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
 use nanotap::study::fixed_step::FixedStepRun;
 use nanotap::study::simulate::{
@@ -28,6 +27,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let model = case.model()?;
     let report = progress::study::<SimulateStudy>(&case, &request, &ThreadsArgument::default())?;
     let units = case.units();
+    arguments.draw(&case, &report)?;
     match &report {
         SimulateReport::Exact(report) => {
             let run = &report.motion;
@@ -35,18 +35,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 let resolution = request.resolution;
                 series::write(path, &model, &run.start, run.periods, resolution, &units)?;
             }
-            arguments
-                .plot
-                .draw(|| simulation_figure(&model, run, &units))?;
             let (seen, physical) = (&run.observables, report.physical.as_ref());
             motion::warn(seen, physical, &run.out_of_range, "", output);
             output.notes(&run.notes);
         }
         SimulateReport::FixedStep(run) => {
-            arguments.out.write(|| curve(run, &units))?;
-            arguments
-                .plot
-                .draw(|| fixed_step_figure(&model, run, &units))?;
+            arguments.out.write(|| run.curve_table(units).csv())?;
             output.notes(&run.notes);
             output.note(
                 "rk4 is the paper's method, kept to show the effect of a time step; its results are not certified",
@@ -128,29 +122,6 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation, request: &SimulateOpt
         number::significant(run.evaluations_per_period, 3),
     )));
     text
-}
-
-/// Time, tip displacement and its rate at every step.
-fn curve(run: &FixedStepRun, units: &Units) -> String {
-    let time = match units {
-        Units::Model => "tau",
-        Units::Si(_) => "time",
-    };
-    let columns = [
-        (time, Kind::Time),
-        ("tip", Kind::Length),
-        ("tip_rate", Kind::Velocity),
-    ];
-    let header = columns.map(|(name, kind)| units.column(name, kind));
-    let mut csv = header.join(",") + "\n";
-    for point in &run.curve {
-        let cells = columns.iter().zip(point);
-        csv.push_str(&number::row(
-            cells.map(|((_, kind), value)| units.scaled(*kind, *value)),
-        ));
-        csv.push('\n');
-    }
-    csv
 }
 
 fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {

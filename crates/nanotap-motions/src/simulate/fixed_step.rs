@@ -20,9 +20,11 @@ use crate::simulate::{
     Classification, Grid, Named, SimulateOptions, check_periods, check_states, is_none,
     starting_state,
 };
+use nanotap_case::units::Units;
 use nanotap_error::Error;
 use nanotap_model::model_map::ModelMap;
 use nanotap_model::{FlowError, Model};
+use nanotap_observe::frame::{Frame, Rows, frame};
 
 /// Drive periods discarded first, unless the options say otherwise.
 const TRANSIENT: usize = 500;
@@ -88,6 +90,18 @@ pub struct FixedStepRun {
     /// All strobe points of the recording, tip displacement and its rate, for figures.
     #[serde(skip)]
     pub strobe_curve: Vec<[f64; 2]>,
+}
+
+impl FixedStepRun {
+    /// Time, tip displacement and its rate at every step of the first recorded periods.
+    pub fn curve_table(&self, units: Units) -> Frame<'_> {
+        frame! { Rows::new("curve", &self.curve, Some(units));
+            "tau", "", (Time, Digits(5)) => |p| p[0];
+            .si_name("time");
+            "tip", "", (Length, Digits(5)) => |p| p[1];
+            "tip_rate", "", (Velocity, Digits(5)) => |p| p[2];
+        }
+    }
 }
 
 /// Classification by the exact flow.

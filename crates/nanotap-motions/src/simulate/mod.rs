@@ -11,6 +11,7 @@ use nanotap_dynamics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::figure::motion::{fixed_step_figure, simulation_figure};
 use crate::initial_state::initial_state_note;
 use fixed_step::{FixedStepRun, fixed_step_run};
 use nanotap_case::Case;
@@ -18,10 +19,12 @@ use nanotap_case::state::WrittenState;
 use nanotap_case::units::Units;
 use nanotap_dynamics::control::Control;
 use nanotap_error::Error;
+use nanotap_figures::Figure;
 use nanotap_model::model_map::ModelMap;
 use nanotap_model::recording::Recording;
 use nanotap_model::{Model, MotionError};
 use nanotap_observe::PhysicalMotion;
+use nanotap_observe::frame::Frame;
 use nanotap_observe::{
     ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record,
 };
@@ -543,6 +546,23 @@ impl Study for SimulateStudy {
     const ABOUT: &'static str = "Simulate a motion: its steady state or its transient";
     type Options = SimulateOptions;
     type Report = SimulateReport;
+
+    /// The grid of a run with fixed steps. The exact motion is a function of time: `--out` and Python
+    /// sample it as finely as asked.
+    fn frames<'a>(case: &Case, report: &'a SimulateReport) -> Vec<Frame<'a>> {
+        match report {
+            SimulateReport::Exact(_) => Vec::new(),
+            SimulateReport::FixedStep(run) => vec![run.curve_table(case.units())],
+        }
+    }
+
+    fn figure(case: &Case, report: &SimulateReport) -> Option<Figure> {
+        let (model, units) = (case.model().ok()?, case.units());
+        Some(match report {
+            SimulateReport::Exact(run) => simulation_figure(&model, &run.motion, &units),
+            SimulateReport::FixedStep(run) => fixed_step_figure(&model, run, &units),
+        })
+    }
 
     fn compute(
         case: &Case,

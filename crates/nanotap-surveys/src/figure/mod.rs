@@ -5,5 +5,6 @@ pub mod bimodal;
 pub mod contact_laws;
 pub mod convergence;
 pub mod modes;
+pub mod noise;
 pub mod sweep;
 pub mod window;

@@ -15,6 +15,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::figure::noise::noise_figure;
 pub use free_lever::{Calibrations, ThermalSpectrum};
 pub use linearised::ReadingSpectrum;
 use linearised::{Linearised, LockIn};
@@ -24,6 +25,7 @@ use nanotap_case::physical::Kind;
 use nanotap_case::state::WrittenState;
 use nanotap_dynamics::control::Control;
 use nanotap_error::Error;
+use nanotap_figures::Figure;
 use nanotap_model::Model;
 use nanotap_model::cantilever::Cantilever;
 use nanotap_model::galerkin::Galerkin;
@@ -50,6 +52,7 @@ pub struct NoiseReport {
     #[schemars(extend("x-unit" = "s"))]
     pub time_constant: f64,
     /// Noise bandwidth of this filter in Hz, 1 over four time constants.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub bandwidth: f64,
     /// Root mean square of the tip deflection of the lever alone, without a drive, in m.
     #[schemars(extend("x-unit" = "m"))]
@@ -185,6 +188,10 @@ impl Study for NoiseStudy {
 
     fn frames<'a>(_: &Case, report: &'a NoiseReport) -> Vec<Frame<'a>> {
         vec![report.spectrum.table()]
+    }
+
+    fn figure(_: &Case, report: &NoiseReport) -> Option<Figure> {
+        Some(noise_figure(report))
     }
 
     fn compute(

@@ -6,5 +6,5 @@ pub use nanotap_motions::figure::{
 };
 pub use nanotap_scan::figure::{force_curve, scan};
 pub use nanotap_surveys::figure::{
-    basin, bimodal, contact_laws, convergence, modes, sweep, window,
+    basin, bimodal, contact_laws, convergence, modes, noise, sweep, window,
 };

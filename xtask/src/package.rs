@@ -70,12 +70,7 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     // An archive of another version would be installed instead.
     let _ = fs::remove_dir_all(&folder);
     let mut pack = workspace.python_tool("maturin")?;
-    pack.args([
-        "sdist",
-        "--manifest-path",
-        "crates/nanotap-python/Cargo.toml",
-    ]);
-    pack.arg("--out").arg(&folder);
+    pack.args(["sdist", "--out"]).arg(&folder);
     if !succeeds(&workspace.root, &mut pack)? {
         return Ok(Tally::check(false));
     }

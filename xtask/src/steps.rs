@@ -144,7 +144,7 @@ fn python(workspace: &Workspace) -> Result<Tally, String> {
         tally += check(&workspace.root, command.args(arguments))?;
     }
     let mut types = workspace.python_tool("mypy")?;
-    types.args(["--config-file", "crates/nanotap-python/pyproject.toml"]);
+    types.args(["--config-file", "pyproject.toml"]);
     types.arg("crates/nanotap-python/python/nanotap");
     tally += check(&workspace.root, &mut types)?;
     Ok(tally)

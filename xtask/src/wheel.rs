@@ -20,7 +20,6 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
     }
     let mut command = workspace.python_tool("maturin")?;
     command.args(["build", "--release", "--locked"]);
-    command.args(["--manifest-path", "crates/nanotap-python/Cargo.toml"]);
     command
         .args(["--interpreter", "python3", "--out"])
         .arg(&folder);

@@ -332,6 +332,13 @@ impl Attractors {
                 .map(|end| significant(100.0 * end, 3));
             format!("{low} … {high}")
         };
+        // What an instrument shows, where there is one.
+        let shown = match units {
+            Units::Si(_) => "attractor,motion,fraction,interval,exponent,A,phase,E_dis,F_max,contact",
+            Units::Model => {
+                "attractor,motion,fraction,interval,exponent,tip,contact_fraction,contacts_per_period"
+            }
+        };
         frame! { Rows::new("attractors", self.attractors.iter().enumerate(), Some(units));
             "attractor", "", Plain => |(k, _)| k + 1;
             "motion", "motion", Plain => move |(_, a)| motion(a);
@@ -343,6 +350,8 @@ impl Attractors {
                 |(_, a)| Some(a.observables()?.contact_fraction);
             "contacts_per_period", "contacts/period", Digits(3) =>
                 |(_, a)| Some(a.observables()?.contacts_per_period);
+            .observed(ObservableSet::COMMON, |(_, a)| a.observables());
+            .shown(shown);
         }
     }
 

@@ -10,8 +10,7 @@ use crate::{Error, Format, Limits, read_within, recognise};
 #[derive(Debug)]
 struct Files(Vec<(String, Document)>);
 
-pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
-    let archive = Archive::open(bytes)?;
+pub(crate) fn read(archive: &Archive, limits: Limits) -> Result<Document, Error> {
     let budget = &mut Budget::new(limits);
     let mut document = Document::new(Format::Zip, limits);
     let mut files = Vec::new();

@@ -6,13 +6,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::bytes::{Bytes, Encoding, Number};
+use crate::bytes::{Encoding, Number};
 use crate::distance::{Names, finish};
-use crate::document::{Channel, Curve, CurveSource, Document, Grid, Image, Segment, Style};
+use crate::document::{Channel, Curve, CurveSource, Document, Grid, Image, Lever, Segment, Style};
 use crate::limits::{
     Budget, MAX_CHANNELS, MAX_CURVES, MAX_HEADER, MAX_LINE, MAX_PROPERTIES, at_most,
 };
 use crate::text::{latin1, leading_number, number, si};
+use crate::source::{ReadAt, Source};
 use crate::{Error, Format, Limits};
 
 const RAMP: &str = "ramp";
@@ -26,6 +27,8 @@ const NAMES: Names = Names {
 const END: &[u8] = b"\\*File list end";
 /// Numbers of version 9.2 may have 8 more bits than the header says.
 const MORE_BITS: f64 = 256.0;
+/// Bytes that are looked through together.
+const PART: usize = 1 << 20;
 
 type Section = BTreeMap<String, String>;
 
@@ -74,8 +77,7 @@ impl<'a> Setting<'a> {
 }
 
 impl Header {
-    fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let head = &bytes[..bytes.len().min(MAX_HEADER)];
+    fn parse(head: &[u8]) -> Result<Self, Error> {
         let end = head
             .windows(END.len())
             .position(|of| of == END)
@@ -210,7 +212,7 @@ impl Data {
     /// Finds `count` numbers; `is_curve` tells how they are scaled.
     fn find(
         header: &Header,
-        file: &Bytes,
+        file: &Source,
         section: &Section,
         count: usize,
         is_curve: bool,
@@ -245,7 +247,8 @@ impl Data {
                 "a place after it",
             ));
         }
-        let raw = file.slice(first, count * width)?;
+        let length = count.saturating_mul(width);
+        file.check(first as u64, length as u64, Format::Nanoscope)?;
         let text = setting(section, "Z scale")
             .ok_or_else(|| damaged("@2:Z scale", "missing", "a scale"))?;
         let scale = Setting::parse(text);
@@ -262,7 +265,14 @@ impl Data {
         let mut factor =
             step.ok_or_else(|| damaged("@2:Z scale", text, "a scale that is not 0"))? * soft;
         let limit = 2f64.powi(8 * stated as i32 - 1);
-        let has_more_bits = width > stated && encoding(width).all(raw).any(|of| of.abs() >= limit);
+        let mut has_more_bits = false;
+        let mut at = 0;
+        while width > stated && !has_more_bits && at < length {
+            let part = (length - at).min(PART);
+            let raw = file.read((first + at) as u64, part, Format::Nanoscope)?;
+            has_more_bits = encoding(width).all(&raw).any(|of| of.abs() >= limit);
+            at += part;
+        }
         if has_more_bits {
             factor /= MORE_BITS;
         }
@@ -280,15 +290,11 @@ impl Data {
         })
     }
 
-    fn values(&self, file: &[u8], from: usize, count: usize) -> Vec<f64> {
+    fn values(&self, file: &Source, from: usize, count: usize) -> Result<Vec<f64>, Error> {
         let first = self.first + from * self.width;
-        let raw = file
-            .get(first..first + count * self.width)
-            .unwrap_or_default();
-        encoding(self.width)
-            .all(raw)
-            .map(|of| of * self.factor)
-            .collect()
+        let raw = file.read(first as u64, count * self.width, Format::Nanoscope)?;
+        let numbers = encoding(self.width).all(&raw);
+        Ok(numbers.map(|of| of * self.factor).collect())
     }
 
     fn end(&self) -> usize {
@@ -303,7 +309,7 @@ fn encoding(width: usize) -> Encoding {
 /// The curves of a file.
 #[derive(Debug)]
 struct Curves {
-    file: Vec<u8>,
+    file: Source,
     channels: Vec<Data>,
     /// Points of approach, hold and retract.
     points: [usize; 3],
@@ -313,15 +319,14 @@ struct Curves {
     /// Duration of half a period (s).
     duration: Option<f64>,
     hold_time: Option<f64>,
-    spring_constant: Option<f64>,
-    sensitivity: Option<f64>,
+    lever: Lever,
+    /// Of the only curve.
     position: Option<[f64; 2]>,
     grid: Option<Grid>,
 }
 
-pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
-    let header = Header::parse(&bytes)?;
-    let file = Bytes::new(&bytes, Format::Nanoscope);
+pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
+    let header = Header::parse(&file.beginning(MAX_HEADER, Format::Nanoscope)?)?;
     let mut document = Document::new(Format::Nanoscope, limits);
     let context = ["file list", "force file list"]
         .iter()
@@ -349,7 +354,7 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
                 data.name
             ));
         }
-        let values = data.values(&bytes, 0, count);
+        let values = data.values(&file, 0, count)?;
         // The first line in the file is the lowest.
         let image = Image::new(
             &*data.name,
@@ -374,13 +379,9 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
     let lists = header.lists("ciao force image list");
     if !lists.is_empty() {
         at_most(lists.len(), MAX_CHANNELS, "channels in a curve")?;
-        let (curves, notes) = curves(&header, &file, &lists, grid, &mut places)?;
-        document.notes.extend(notes);
+        let curves = curves(&header, file, &lists, grid, &mut places, &mut document.notes)?;
         document.grid = grid;
-        document.curves = Box::new(Curves {
-            file: bytes,
-            ..curves
-        });
+        document.curves = Box::new(curves);
     } else if document.images.is_empty() {
         let content = "a Bruker file without curves and images";
         return Err(Format::Nanoscope.unsupported(content, "only those are read"));
@@ -423,13 +424,13 @@ fn scan_size(header: &Header, section: &Section) -> Option<[f64; 2]> {
 
 fn curves(
     header: &Header,
-    file: &Bytes,
+    file: Source,
     lists: &[&Section],
     grid: Option<Grid>,
     places: &mut Vec<(usize, usize)>,
-) -> Result<(Curves, Vec<String>), Error> {
+    notes: &mut Vec<String>,
+) -> Result<Curves, Error> {
     let force = "ciao force list";
-    let mut notes = Vec::new();
     let samples = lists[0].get("Samps/line").map_or("", String::as_str);
     let mut sides = samples
         .split_whitespace()
@@ -453,7 +454,7 @@ fn curves(
     at_most(count, MAX_CURVES, "curves in a file")?;
     let mut channels: Vec<Data> = Vec::new();
     for section in lists {
-        let data = Data::find(header, file, section, total.saturating_mul(count), true)?;
+        let data = Data::find(header, &file, section, total.saturating_mul(count), true)?;
         places.push((data.first, data.end()));
         if channels.iter().all(|of| of.name != data.name) {
             channels.push(data);
@@ -480,17 +481,19 @@ fn curves(
         );
     }
     let curves = Curves {
-        file: Vec::new(),
+        file,
         channels,
         points: [approach, hold, retract],
         count,
         ramp: ramp.filter(|of| *of > 0.0),
         duration,
         hold_time: header.number(force, "Hold Time"),
-        spring_constant: spring_constant
-            .and_then(|of| number(of))
-            .filter(|of| *of > 0.0),
-        sensitivity: (unit == "m" && sensitivity > 0.0).then_some(sensitivity),
+        lever: Lever {
+            spring_constant: spring_constant
+                .and_then(|of| number(of))
+                .filter(|of| *of > 0.0),
+            sensitivity: (unit == "m" && sensitivity > 0.0).then_some(sensitivity),
+        },
         position: grid
             .is_none()
             .then(|| offset("X Offset").zip(offset("Y Offset")))
@@ -498,18 +501,13 @@ fn curves(
             .map(|(x, y)| [x, y]),
         grid,
     };
-    curves.check_trigger(header, file, &mut notes)?;
-    Ok((curves, notes))
+    curves.check_trigger(header, notes)?;
+    Ok(curves)
 }
 
 impl Curves {
     /// Where numbers have more bits than stated, the largest deflection must be near the trigger.
-    fn check_trigger(
-        &self,
-        header: &Header,
-        file: &Bytes,
-        notes: &mut Vec<String>,
-    ) -> Result<(), Error> {
+    fn check_trigger(&self, header: &Header, notes: &mut Vec<String>) -> Result<(), Error> {
         let Some(data) = self
             .channels
             .iter()
@@ -530,7 +528,7 @@ impl Curves {
         let Some(threshold) = threshold.filter(|of| *of > 0.0) else {
             return Ok(());
         };
-        let approach = data.values(file.data, 0, self.points[0]);
+        let approach = data.values(&self.file, 0, self.points[0])?;
         let highest = approach.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let ratio = (highest - approach.last().unwrap_or(&0.0)) / threshold;
         if (0.5..=2.0).contains(&ratio) {
@@ -547,11 +545,8 @@ impl CurveSource for Curves {
     }
 
     fn curve(&self, number: usize, limits: Limits) -> Result<Curve, Error> {
-        let mut curve = Curve::empty(number);
-        curve.spring_constant = self.spring_constant;
-        curve.sensitivity = self.sensitivity;
-        curve.position = self.position.or_else(|| self.grid?.position(number));
-        curve.pixel = self.grid.map(|_| number);
+        let mut curve = self.lever.curve(number, self.grid.as_ref());
+        curve.position = curve.position.or(self.position);
         let budget = &mut Budget::new(limits);
         let total: usize = self.points.iter().sum();
         let mut from = number * total;
@@ -563,7 +558,7 @@ impl CurveSource for Curves {
             budget.numbers(points.saturating_mul(self.channels.len() + 1))?;
             let mut channels = Vec::new();
             for data in &self.channels {
-                let mut values = data.values(&self.file, from, points);
+                let mut values = data.values(&self.file, from, points)?;
                 // The approach is stored from the contact outwards.
                 if style == Style::Approach {
                     values.reverse();

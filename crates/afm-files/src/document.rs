@@ -125,6 +125,28 @@ pub struct Curve {
     pub notes: Vec<String>,
 }
 
+/// What a file says of the lever of all its curves.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Lever {
+    /// N/m.
+    pub(crate) spring_constant: Option<f64>,
+    /// m/V.
+    pub(crate) sensitivity: Option<f64>,
+}
+
+impl Lever {
+    /// A curve without segments, whose number is that of its pixel if there is a grid.
+    pub(crate) fn curve(&self, number: usize, grid: Option<&Grid>) -> Curve {
+        Curve {
+            spring_constant: self.spring_constant,
+            sensitivity: self.sensitivity,
+            pixel: grid.map(|_| number),
+            position: grid.and_then(|of| of.position(number)),
+            ..Curve::empty(number)
+        }
+    }
+}
+
 /// A part of a curve.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Segment {

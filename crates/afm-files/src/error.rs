@@ -46,6 +46,12 @@ pub enum Error {
         /// How many are allowed.
         limit: u64,
     },
+    /// The disk or the network does not give the file's bytes.
+    #[error("the file cannot be read: {problem}")]
+    Io {
+        /// What the system says.
+        problem: String,
+    },
     /// The curve does not exist.
     #[error("no curve {number}: the file has {count}, counted from 0")]
     NoCurve {

@@ -5,8 +5,8 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::text::latin1;
-use crate::zip::Archive;
-use crate::{igor, ntmdt};
+use crate::zip::Directory;
+use crate::{igor, jpk, ntmdt};
 
 /// Formats that are recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
@@ -73,8 +73,12 @@ impl fmt::Display for Format {
     }
 }
 
+/// Bytes that tell the format.
+pub(crate) const BEGINNING: usize = 4096;
+
 /// First bytes of text formats and others with a fixed beginning.
-const BEGINNINGS: [(&[u8], Format); 14] = [
+const BEGINNINGS: [(&[u8], Format); 15] = [
+    (b"PK\x03\x04", Format::Zip),
     (b"\\*Force file list", Format::Nanoscope),
     (b"\\*File list", Format::Nanoscope),
     (b"?*Force file list", Format::Nanoscope),
@@ -93,11 +97,16 @@ const BEGINNINGS: [(&[u8], Format); 14] = [
 
 /// Recognises a file by its content; `None` if its format is not known here.
 pub fn recognise(bytes: &[u8]) -> Option<Format> {
-    if bytes.starts_with(b"PK\x03\x04") {
-        let archive = Archive::open(bytes).ok();
-        let is_jpk = archive.is_some_and(|of| of.find("header.properties").is_some());
-        return Some(if is_jpk { Format::Jpk } else { Format::Zip });
-    }
+    let format = by_beginning(bytes)?;
+    let is_jpk = || Directory::read(bytes).is_ok_and(|of| of.find(jpk::HEADER).is_some());
+    Some(match format {
+        Format::Zip if is_jpk() => Format::Jpk,
+        format => format,
+    })
+}
+
+/// Recognises a file by its first [`BEGINNING`] bytes; an archive of JPK is a zip archive by these.
+pub(crate) fn by_beginning(bytes: &[u8]) -> Option<Format> {
     if let Some((_, format)) = BEGINNINGS
         .iter()
         .find(|(first, _)| bytes.starts_with(first))
@@ -110,7 +119,7 @@ pub fn recognise(bytes: &[u8]) -> Option<Format> {
     if bytes.get(8..12) == Some(b"ARDF") {
         return Some(Format::Ardf);
     }
-    let head = &bytes[..bytes.len().min(4096)];
+    let head = &bytes[..bytes.len().min(BEGINNING)];
     if head.starts_with(b"Date\t") && latin1(head).contains("Device:\tChiaro") {
         return Some(Format::Chiaro);
     }

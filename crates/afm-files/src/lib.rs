@@ -68,12 +68,14 @@ mod error;
 mod format;
 mod gsf;
 mod gwyddion;
+mod hdf5;
 mod igor;
 mod jpk;
 mod jpk_image;
 mod limits;
 mod nanosurf;
 mod ntmdt;
+mod source;
 mod table;
 mod text;
 mod thermal;
@@ -81,6 +83,14 @@ mod uff;
 mod workshop;
 mod wsxm;
 mod zip;
+
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use limits::Budget;
+use source::Source;
+use zip::Archive;
 
 pub use document::{
     Channel, Curve, Distance, DistanceSource, Document, Grid, Image, Segment, Spectrum, Style,
@@ -104,43 +114,87 @@ pub fn read(bytes: Vec<u8>) -> Result<Document, Error> {
 ///
 /// As [`read`].
 pub fn read_within(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
-    let Some(format) = recognise(&bytes) else {
+    read_source(Source::memory(bytes), limits)
+}
+
+/// Reads a file from its path. Maps stay on the disk: memory is needed for their directory and for the
+/// curves that are decoded, so that a map may be larger than the memory.
+///
+/// # Errors
+///
+/// As [`read`], and [`Error::Io`] if the file cannot be opened or read.
+///
+/// ```no_run
+/// let map = afm_files::open("cells.jpk-qi-data".as_ref(), afm_files::Limits::default())?;
+/// for number in 0..map.curve_count() {
+///     let curve = map.curve(number)?;
+///     println!("{:?} {:?}", curve.position, curve.segments.len());
+/// }
+/// # Ok::<(), afm_files::Error>(())
+/// ```
+pub fn open(path: &Path, limits: Limits) -> Result<Document, Error> {
+    #[expect(clippy::disallowed_methods, reason = "its length is known before it is read")]
+    let file = File::open(path);
+    let file = file.and_then(|file| {
+        if file.metadata()?.is_file() {
+            return Ok(file);
+        }
+        Err(std::io::Error::other("it is a folder or a device"))
+    });
+    let file = file.map_err(|error| Error::Io {
+        problem: format!("`{}`: {error}", path.display()),
+    })?;
+    read_from(file, limits)
+}
+
+/// Reads a file that is open, such as a [`File`], as [`open`] does: from its beginning, wherever its
+/// position is.
+///
+/// # Errors
+///
+/// As [`open`].
+pub fn read_from(
+    file: impl Read + Seek + Send + 'static,
+    limits: Limits,
+) -> Result<Document, Error> {
+    read_source(Source::device(file)?, limits)
+}
+
+fn read_source(source: Source, limits: Limits) -> Result<Document, Error> {
+    let head = source.beginning(format::BEGINNING, Format::Zip)?;
+    let Some(format) = format::by_beginning(&head) else {
         return Err(Error::Unknown {
-            beginning: format::beginning(&bytes),
+            beginning: format::beginning(&head),
         });
     };
+    drop(head);
+    let whole = |source: Source| source.whole(&mut Budget::new(limits), format);
     match format {
-        Format::Jpk => jpk::read(bytes, limits),
-        Format::JpkImage => jpk_image::read(&bytes, limits),
-        Format::JpkThermal => thermal::read(&bytes, limits),
-        Format::Nanoscope => bruker::read(bytes, limits),
-        Format::Nanosurf => nanosurf::read(bytes, limits),
-        Format::Igor => igor::read(&bytes, limits),
-        Format::Ardf => ardf::read(bytes, limits),
-        Format::Gwyddion => gwyddion::read(&bytes, limits),
-        Format::Gsf => gsf::read(&bytes, limits),
-        Format::Workshop => workshop::read(&bytes, limits),
-        Format::NtMdtText => ntmdt::read(&bytes, limits),
-        Format::Chiaro => chiaro::read(&bytes, limits),
-        Format::Uff => uff::read(&bytes, limits),
-        Format::Wsxm => wsxm::read(&bytes, limits),
-        Format::Zip => archive::read(bytes, limits),
+        Format::Zip | Format::Jpk => {
+            let archive = Archive::open(source)?;
+            if archive.find(jpk::HEADER).is_some() {
+                jpk::read(archive, limits)
+            } else {
+                archive::read(&archive, limits)
+            }
+        }
+        Format::JpkImage => jpk_image::read(&whole(source)?, limits),
+        Format::JpkThermal => thermal::read(&whole(source)?, limits),
+        Format::Nanoscope => bruker::read(source, limits),
+        Format::Nanosurf => nanosurf::read(source, limits),
+        Format::Igor => igor::read(&whole(source)?, limits),
+        Format::Ardf => ardf::read(whole(source)?, limits),
+        Format::Gwyddion => gwyddion::read(&whole(source)?, limits),
+        Format::Gsf => gsf::read(&whole(source)?, limits),
+        Format::Workshop => workshop::read(&whole(source)?, limits),
+        Format::NtMdtText => ntmdt::read(&whole(source)?, limits),
+        Format::Chiaro => chiaro::read(&whole(source)?, limits),
+        Format::Uff => uff::read(&whole(source)?, limits),
+        Format::Wsxm => wsxm::read(&whole(source)?, limits),
         Format::Asd => Err(format.unsupported(
             "a high-speed AFM video (.asd)",
             "only curves, images and spectra are read",
         )),
-        Format::Hdf5 => Err(format.unsupported(hdf5_content(&bytes), "HDF5 is not read")),
-    }
-}
-
-/// What an HDF5 file is, by names in it.
-fn hdf5_content(bytes: &[u8]) -> &'static str {
-    let has = |name: &[u8]| bytes.windows(name.len()).any(|of| of == name);
-    if has(b"afmformats") {
-        "an HDF5 file of afmformats"
-    } else if has(b"JPK") {
-        "an HDF5 file of JPK"
-    } else {
-        "an HDF5 file"
+        Format::Hdf5 => hdf5::read(source, limits),
     }
 }

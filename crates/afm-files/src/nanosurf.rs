@@ -5,18 +5,18 @@
 //! this is what the maker's reader NSFopen does, measured on nine real files.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use crate::bytes::{Encoding, Number};
 use crate::distance::{Names, finish};
 use crate::document::{
-    Channel, Curve, CurveSource, Document, Grid, Image, Segment, Spectrum, Style,
+    Channel, Curve, CurveSource, Document, Grid, Image, Lever, Segment, Spectrum, Style,
 };
 use crate::limits::{
     Budget, MAX_CHANNELS, MAX_CURVES, MAX_HEADER, MAX_LINE, MAX_PROPERTIES, at_most,
 };
 use crate::text::{leading_number, number, utf8_or_windows};
+use crate::source::{ReadAt, Source};
 use crate::{Error, Format, Limits};
 
 const AXIS: &str = "commanded Z";
@@ -39,7 +39,8 @@ struct Data {
     points: usize,
     lines: usize,
     encoding: Encoding,
-    place: Range<usize>,
+    /// Where its numbers begin.
+    first: u64,
     low: f64,
     range: f64,
 }
@@ -54,17 +55,17 @@ impl Data {
     }
 
     /// The first values of a line.
-    fn line(&self, bytes: &[u8], line: usize, points: usize) -> Vec<f64> {
+    fn line(&self, file: &Source, line: usize, points: usize) -> Result<Vec<f64>, Error> {
         let size = self.encoding.size();
-        let first = self.place.start + line * self.points * size;
-        let raw = &bytes[first..first + points.min(self.points) * size];
+        let first = self.first + (line * self.points * size) as u64;
+        let raw = file.read(first, points.min(self.points) * size, Format::Nanosurf)?;
         let levels = 2f64.powi(8 * size as i32);
         let zero = match self.encoding.number {
             Number::Unsigned(_) => 0.0,
             _ => levels / 2.0,
         };
         let value = |of: f64| (of + zero) * (self.range / levels) + self.low;
-        self.encoding.all(raw).map(value).collect()
+        Ok(self.encoding.all(&raw).map(value).collect())
     }
 
     /// Valid points of a line, and its axis from the first to the last.
@@ -84,18 +85,17 @@ impl Data {
 /// The spectroscopy of a file.
 #[derive(Debug)]
 struct Spectroscopy {
-    bytes: Vec<u8>,
+    file: Source,
     /// Channels with the style of their segment.
     channels: Vec<(Style, Data)>,
     count: usize,
     grid: Option<Grid>,
-    spring_constant: Option<f64>,
-    sensitivity: Option<f64>,
+    lever: Lever,
     durations: [Option<f64>; 2],
 }
 
-pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
-    let header = &bytes[..bytes.len().min(MAX_HEADER)];
+pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
+    let header = file.beginning(MAX_HEADER, Format::Nanosurf)?;
     let mark = header
         .windows(2)
         .position(|two| two == b"#!")
@@ -106,11 +106,12 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
                 "the mark #! after it",
             )
         })?;
-    let sections = sections(&bytes[..mark])?;
+    let sections = sections(&header[..mark])?;
+    drop(header);
     let mut document = Document::new(Format::Nanosurf, limits);
-    let (channels, end) = channels(&sections, mark + 2, bytes.len())?;
-    if end < bytes.len() {
-        let left = bytes.len() - end;
+    let (channels, end) = channels(&sections, mark as u64 + 2, file.length())?;
+    if end < file.length() {
+        let left = file.length() - end;
         document
             .notes
             .push(format!("{left} bytes after the last channel are not read"));
@@ -133,10 +134,10 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
             spectroscopy.push((style, data));
         } else if data.text("Dim0Unit") == "Hz" {
             budget.numbers(2 * data.points)?;
-            document.spectra.push(spectrum(&data, &bytes));
+            document.spectra.push(spectrum(&data, &file)?);
         } else {
             budget.numbers(data.points * data.lines)?;
-            document.images.push(image(&data, &bytes));
+            document.images.push(image(&data, &file)?);
         }
     }
     let section = |name: &str| sections.get(name);
@@ -169,12 +170,14 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
         .max()
         .unwrap_or(0);
     document.curves = Box::new(Spectroscopy {
-        bytes,
+        file,
         channels: spectroscopy,
         count,
         grid,
-        spring_constant: stiffness.filter(|of| *of > 0.0),
-        sensitivity: full_scale.map(|of| of / 10.0).filter(|of| *of > 0.0),
+        lever: Lever {
+            spring_constant: stiffness.filter(|of| *of > 0.0),
+            sensitivity: full_scale.map(|of| of / 10.0).filter(|of| *of > 0.0),
+        },
         durations: [duration("FwModTime"), duration("BwModTime")],
     });
     Ok(document)
@@ -207,7 +210,7 @@ fn sections(header: &[u8]) -> Result<Sections, Error> {
 }
 
 /// All channels that the header lists, and the end of their numbers.
-fn channels(sections: &Sections, first: usize, length: usize) -> Result<(Vec<Data>, usize), Error> {
+fn channels(sections: &Sections, first: u64, length: u64) -> Result<(Vec<Data>, u64), Error> {
     let missing = |section: &str, key: &str| {
         Format::Nanosurf.at_key(
             format!("[{section}] {key}"),
@@ -267,7 +270,7 @@ fn channels(sections: &Sections, first: usize, length: usize) -> Result<(Vec<Dat
                 .checked_mul(lines)
                 .and_then(|of| of.checked_mul(width));
             let end = size
-                .and_then(|of| at.checked_add(of))
+                .and_then(|of| at.checked_add(of as u64))
                 .filter(|end| *end <= length);
             let end = end.ok_or_else(|| {
                 let problem = format!("{points} points in {lines} lines from byte {at} on");
@@ -286,7 +289,7 @@ fn channels(sections: &Sections, first: usize, length: usize) -> Result<(Vec<Dat
                     number,
                     big_endian: says("SaveOrder", "") && !says("SaveOrder", "intel"),
                 },
-                place: at..end,
+                first: at,
                 low: scale("Dim2Min")?,
                 range: scale("Dim2Range")?,
             });
@@ -308,10 +311,10 @@ fn settings(sections: &Sections) -> Vec<(String, String)> {
     named.collect()
 }
 
-fn spectrum(data: &Data, bytes: &[u8]) -> Spectrum {
+fn spectrum(data: &Data, file: &Source) -> Result<Spectrum, Error> {
     let (_, low, range) = data.axis(usize::MAX);
     let last = data.points.max(2) - 1;
-    Spectrum {
+    Ok(Spectrum {
         name: data.group.clone(),
         unit: data.text("Dim2Unit").to_owned(),
         frequency: (0..data.points)
@@ -320,27 +323,28 @@ fn spectrum(data: &Data, bytes: &[u8]) -> Spectrum {
         values: if data.lines == 0 {
             Vec::new()
         } else {
-            data.line(bytes, 0, data.points)
+            data.line(file, 0, data.points)?
         },
-    }
+    })
 }
 
-fn image(data: &Data, bytes: &[u8]) -> Image {
+fn image(data: &Data, file: &Source) -> Result<Image, Error> {
     let is_length = ["Dim0Unit", "Dim1Unit"]
         .iter()
         .all(|key| data.text(key) == "m");
     let size = data.number("Dim0Range").zip(data.number("Dim1Range"));
+    let mut values = Vec::new();
     // The first line in the file is the lowest.
-    let lines = (0..data.lines).rev();
-    Image::new(
+    for line in (0..data.lines).rev() {
+        values.extend(data.line(file, line, data.points)?);
+    }
+    Ok(Image::new(
         format!("{}: {}", data.group, data.text("Dim2Name")),
         data.text("Dim2Unit"),
         [data.points, data.lines],
         size.filter(|_| is_length).map(|(x, y)| [x, y]),
-        lines
-            .flat_map(|line| data.line(bytes, line, data.points))
-            .collect(),
-    )
+        values,
+    ))
 }
 
 /// The grid `x0;x1;y0;y1;nx;ny;…` of a map, row by row; the ends are places of curves.
@@ -365,11 +369,7 @@ impl CurveSource for Spectroscopy {
     }
 
     fn curve(&self, number: usize, limits: Limits) -> Result<Curve, Error> {
-        let mut curve = Curve::empty(number);
-        curve.spring_constant = self.spring_constant;
-        curve.sensitivity = self.sensitivity;
-        curve.pixel = self.grid.map(|_| number);
-        curve.position = self.grid.and_then(|grid| grid.position(number));
+        let mut curve = self.lever.curve(number, self.grid.as_ref());
         let budget = &mut Budget::new(limits);
         for (style, data) in self.channels.iter().filter(|(_, data)| number < data.lines) {
             let (points, low, range) = data.axis(number);
@@ -406,7 +406,7 @@ impl CurveSource for Spectroscopy {
                 ));
                 continue;
             }
-            let values = in_time(data.line(&self.bytes, number, points));
+            let values = in_time(data.line(&self.file, number, points)?);
             let unit = data.text("Dim2Unit");
             segment.channels.push(Channel::new(name, unit, values));
         }

@@ -31,7 +31,7 @@ const IMAGES: [&str; 2] = ["data-image.jpk-qi-image", "data-image.force"];
 /// The curves of an archive.
 #[derive(Debug)]
 struct File {
-    archive: Archive<Vec<u8>>,
+    archive: Archive,
     shared: Properties,
     curves: Vec<Place>,
 }
@@ -47,14 +47,16 @@ struct Place {
     end: usize,
 }
 
-pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
-    let archive = Archive::open(bytes)?;
+/// The header of an archive of JPK.
+pub(crate) const HEADER: &str = "header.properties";
+
+pub(crate) fn read(archive: Archive, limits: Limits) -> Result<Document, Error> {
     let budget = &mut Budget::new(limits);
     let of_file = |name: &str, budget: &mut Budget| match archive.find(name) {
         Some(file) => parse(&archive.unpack(file, budget)?),
         None => Ok(Properties::new()),
     };
-    let top = of_file("header.properties", budget)?;
+    let top = of_file(HEADER, budget)?;
     let shared = of_file("shared-data/header.properties", budget)?;
     let mut document = Document::new(Format::Jpk, limits);
     let kind = ["type", "jpk-data-file"]
@@ -90,7 +92,7 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
 }
 
 /// The curves of an archive in the order of their numbers.
-fn places(archive: &Archive<Vec<u8>>) -> Result<Vec<Place>, Error> {
+fn places(archive: &Archive) -> Result<Vec<Place>, Error> {
     let mut curves: Vec<Place> = Vec::new();
     let mut current: Option<(String, Place)> = None;
     // The names are sorted, so those of one curve follow each other.
@@ -147,7 +149,7 @@ impl CurveSource for File {
         for file in place.first..place.end {
             let name = self.archive.name(file);
             let name = &name[place.prefix..];
-            if name == "header.properties" {
+            if name == HEADER {
                 own = Some(file);
             } else if let Some((segment, part)) = segment_file(name) {
                 let files = segments.entry(segment).or_default();
@@ -159,7 +161,7 @@ impl CurveSource for File {
         }
         at_most(segments.len(), MAX_SEGMENTS, "segments in a curve")?;
         // A single curve has its position in the header of the file.
-        let own = own.or_else(|| self.archive.find("header.properties"));
+        let own = own.or_else(|| self.archive.find(HEADER));
         if let Some(file) = own {
             let own = parse(&self.archive.unpack(file, budget)?)?;
             let of_end = |end: &str| {

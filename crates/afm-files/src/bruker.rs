@@ -12,8 +12,8 @@ use crate::document::{Channel, Curve, CurveSource, Document, Grid, Image, Lever,
 use crate::limits::{
     Budget, MAX_CHANNELS, MAX_CURVES, MAX_HEADER, MAX_LINE, MAX_PROPERTIES, at_most,
 };
-use crate::text::{latin1, leading_number, number, si};
 use crate::source::{ReadAt, Source};
+use crate::text::{latin1, leading_number, number, si};
 use crate::{Error, Format, Limits};
 
 const RAMP: &str = "ramp";
@@ -379,7 +379,14 @@ pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
     let lists = header.lists("ciao force image list");
     if !lists.is_empty() {
         at_most(lists.len(), MAX_CHANNELS, "channels in a curve")?;
-        let curves = curves(&header, file, &lists, grid, &mut places, &mut document.notes)?;
+        let curves = curves(
+            &header,
+            file,
+            &lists,
+            grid,
+            &mut places,
+            &mut document.notes,
+        )?;
         document.grid = grid;
         document.curves = Box::new(curves);
     } else if document.images.is_empty() {

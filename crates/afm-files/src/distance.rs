@@ -4,8 +4,10 @@ use std::fmt::Write;
 
 use crate::document::{Curve, Distance, DistanceSource, Segment, Style};
 
-/// A channel that is a force by its name.
-const FORCE: &str = "Force";
+/// Whether a channel is a force by its name.
+fn is_force(name: &str) -> bool {
+    name.eq_ignore_ascii_case("force")
+}
 
 /// Names of a format's channels, by preference.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +77,7 @@ pub(crate) fn finish(curve: &mut Curve, names: &Names) {
     if let Some(name) = &curve.deflection
         && let Some(channel) = recorded.iter().find_map(|of| of.channel(name))
     {
-        if channel.unit != "m" && channel.name != FORCE {
+        if channel.unit != "m" && !is_force(&channel.name) {
             let (unit, missing) = match channel.unit.as_str() {
                 "N" => ("N", "spring constant"),
                 "" => ("no unit", "sensitivity (InvOLS)"),
@@ -113,7 +115,7 @@ fn deflection_to_length(curve: &mut Curve, names: &Names) {
     for channel in channels.filter(|of| names.deflection.contains(&of.name.as_str())) {
         let factor = match channel.unit.as_str() {
             "V" => sensitivity,
-            "N" if channel.name != FORCE => spring_constant.map(|of| 1.0 / of),
+            "N" if !is_force(&channel.name) => spring_constant.map(|of| 1.0 / of),
             _ => None,
         };
         if let Some(factor) = factor {

@@ -322,6 +322,43 @@ impl Grid {
         (row < self.shape[1]).then_some([column, row])
     }
 
+    /// Number of a place in the order of recording, by its column and row.
+    pub fn pixel(&self, [column, row]: [usize; 2]) -> Option<usize> {
+        if column >= self.shape[0] || row >= self.shape[1] {
+            return None;
+        }
+        let is_reversed = self.back_and_forth && row % 2 == 1;
+        let column = if is_reversed {
+            self.shape[0] - 1 - column
+        } else {
+            column
+        };
+        row.checked_mul(self.shape[0])?.checked_add(column)
+    }
+
+    /// How many places there are.
+    pub fn places(&self) -> usize {
+        self.shape[0].saturating_mul(self.shape[1])
+    }
+
+    /// Column and row of the place in whose share a position (m) is.
+    pub fn cell_at(&self, position: [f64; 2]) -> Option<[usize; 2]> {
+        let [dx, dy] = [0, 1].map(|k| position[k] - self.centre[k]);
+        let (sin, cos) = libm::sincos(self.angle);
+        let along = |k: usize, of: f64| {
+            // A single row may have no height.
+            let share = if self.size[k] == 0.0 {
+                0.0
+            } else {
+                of / self.size[k]
+            };
+            let index = ((share + 0.5) * self.shape[k] as f64).floor();
+            (index >= 0.0 && index < self.shape[k] as f64).then_some(index as usize)
+        };
+        let column = along(0, dx * cos + dy * sin)?;
+        Some([column, along(1, dy * cos - dx * sin)?])
+    }
+
     /// Position of a place (m), by its number in the order of recording.
     pub fn position(&self, pixel: usize) -> Option<[f64; 2]> {
         let cell = self.cell(pixel)?;
@@ -405,6 +442,14 @@ mod tests {
         };
         assert_eq!(grid.cell(2), Some([1, 1]));
         assert_eq!(grid.cell(4), None);
+        for pixel in 0..grid.places() {
+            let cell = grid.cell(pixel).expect("a place of the grid");
+            assert_eq!(grid.pixel(cell), Some(pixel));
+            let position = grid.position(pixel).expect("a place of the grid");
+            assert_eq!(grid.cell_at(position), Some(cell));
+        }
+        assert_eq!(grid.pixel([2, 0]), None);
+        assert_eq!(grid.cell_at([13.0, 0.0]), None);
         let [x, y] = grid.position(0).expect("a place of the grid");
         assert!(
             (x - 11.0).abs() < 1e-12 && (y + 0.5).abs() < 1e-12,

@@ -25,6 +25,8 @@ pub enum Format {
     Nanosurf,
     /// Igor binary wave of Asylum Research: `.ibw`.
     Igor,
+    /// Igor experiment: `.pxp`, `.pxt`.
+    IgorExperiment,
     /// Asylum Research: `.ardf`.
     Ardf,
     /// Gwyddion: `.gwy`.
@@ -58,6 +60,7 @@ impl fmt::Display for Format {
             Self::Nanoscope => "Bruker Nanoscope",
             Self::Nanosurf => "Nanosurf .nid",
             Self::Igor => "Igor binary wave",
+            Self::IgorExperiment => "Igor experiment",
             Self::Ardf => "Asylum .ardf",
             Self::Gwyddion => "Gwyddion .gwy",
             Self::Gsf => "Gwyddion simple field",
@@ -131,6 +134,9 @@ pub(crate) fn by_beginning(bytes: &[u8]) -> Option<Format> {
     }
     if igor::version(bytes).is_some() {
         return Some(Format::Igor);
+    }
+    if igor::is_experiment(head) {
+        return Some(Format::IgorExperiment);
     }
     ntmdt::begins(head).then_some(Format::NtMdtText)
 }

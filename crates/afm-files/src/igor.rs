@@ -30,9 +30,9 @@ pub(crate) fn version(bytes: &[u8]) -> Option<(u8, bool)> {
         _ => return None,
     };
     let length = match version {
-        1 => 118,
-        2 => 126,
-        3 => 130,
+        1 => 134,
+        2 => 142,
+        3 => 146,
         5 => HEADER,
         _ => return None,
     };
@@ -46,6 +46,21 @@ pub(crate) fn version(bytes: &[u8]) -> Option<(u8, bool)> {
     });
     let sum = words.fold(0_u16, u16::wrapping_add);
     (sum == 0).then_some((version, big_endian))
+}
+
+/// Whether this is an Igor experiment: its first two records have known types and fit each other.
+pub(crate) fn is_experiment(head: &[u8]) -> bool {
+    let big_endian = head.first() == Some(&0);
+    let bytes = Bytes::new(head, Format::IgorExperiment);
+    // Type, version, size. Newer types are numbered on; the first record is never an unused one.
+    let size = |at: usize| -> Option<usize> {
+        let number = |from: usize, size: usize| bytes.whole(at + from, size, big_endian).ok();
+        let (kind, version) = (number(0, 2)?, number(2, 2)?);
+        let is_known = (1..=30).contains(&(kind & 0x7FFF)) && version <= 8;
+        is_known.then_some(number(4, 4)? as usize)
+    };
+    let second = size(0).filter(|of| (1..head.len()).contains(of));
+    second.and_then(|of| size(8 + of)).is_some_and(|of| of > 0)
 }
 
 /// A wave: numbers in up to four dimensions, column by column.
@@ -102,9 +117,10 @@ fn wave(bytes: &[u8], budget: &mut Budget) -> Result<Wave, Error> {
     let Some((5, big_endian)) = version(bytes) else {
         let version = version(bytes).map_or(0, |(of, _)| of);
         let content = format!("an Igor wave of version {version}");
-        return Err(
-            Format::Igor.unsupported(content, "Asylum Research writes version 5, which is read")
-        );
+        return Err(Format::Igor.unsupported(
+            content,
+            "only version 5, which Asylum Research writes, is read",
+        ));
     };
     let bytes = Bytes::new(bytes, Format::Igor);
     let whole =

@@ -37,11 +37,14 @@
 //! | AFM Workshop | `.csv` | a curve; k and InvOLS where they are set |
 //! | NT-MDT Nova | text | a curve; deflection in A, no InvOLS |
 //! | Optics11 Chiaro | text | a curve, cut where the piezo turns; k |
+//! | HDF5 of afmformats | `.h5` | curves and maps, cut into segments; k, InvOLS, positions, the grid |
 //! | Universal force format | `.uff` | a curve; k, InvOLS |
 //! | WSxM | `.stp`, `.top` | an image |
 //! | zip | `.zip` | the content of all files in it |
 //!
-//! HDF5 files and high-speed videos (`.asd`) are recognised and refused with their name.
+//! Files that are recognised and refused with their name: other HDF5 files, such as the images of JPK
+//! (`.h5-jpk`), high-speed videos (`.asd`), Igor experiments (`.pxp`), and Igor waves of older versions
+//! or without named channels.
 //!
 //! # Distance
 //!
@@ -52,8 +55,11 @@
 //!
 //! # Memory and hostile files
 //!
-//! Curves are decoded one by one, so a map of 256 × 256 curves needs the memory of its bytes and of one
-//! curve. No file makes a reader panic or take unbounded memory or time: sizes are checked before memory
+//! Curves are decoded one by one, in any order and from several threads at once ([`Document::curve`]
+//! takes `&self`). [`open`] leaves maps of JPK, Bruker, Nanosurf and HDF5 on the disk: only a directory of
+//! their curves is in memory, so they may be larger than it. [`read`] takes the bytes of a file instead.
+//!
+//! No file makes a reader panic or take unbounded memory or time: sizes are checked before memory
 //! is taken, and [`Limits`] bounds what is decoded.
 #![forbid(unsafe_code)]
 
@@ -133,7 +139,10 @@ pub fn read_within(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
 /// # Ok::<(), afm_files::Error>(())
 /// ```
 pub fn open(path: &Path, limits: Limits) -> Result<Document, Error> {
-    #[expect(clippy::disallowed_methods, reason = "its length is known before it is read")]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "its length is known before it is read"
+    )]
     let file = File::open(path);
     let file = file.and_then(|file| {
         if file.metadata()?.is_file() {
@@ -194,6 +203,10 @@ fn read_source(source: Source, limits: Limits) -> Result<Document, Error> {
         Format::Asd => Err(format.unsupported(
             "a high-speed AFM video (.asd)",
             "only curves, images and spectra are read",
+        )),
+        Format::IgorExperiment => Err(format.unsupported(
+            "an Igor experiment (.pxp)",
+            "save its waves as .ibw, which are read",
         )),
         Format::Hdf5 => hdf5::read(source, limits),
     }

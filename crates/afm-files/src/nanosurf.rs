@@ -15,8 +15,8 @@ use crate::document::{
 use crate::limits::{
     Budget, MAX_CHANNELS, MAX_CURVES, MAX_HEADER, MAX_LINE, MAX_PROPERTIES, at_most,
 };
-use crate::text::{leading_number, number, utf8_or_windows};
 use crate::source::{ReadAt, Source};
+use crate::text::{leading_number, number, utf8_or_windows};
 use crate::{Error, Format, Limits};
 
 const AXIS: &str = "commanded Z";

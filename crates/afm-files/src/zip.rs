@@ -130,7 +130,9 @@ impl Directory {
         for k in (0..files.len()).rev() {
             let file = files[k];
             // Its data follow its header, and what else is there is not another file's.
-            let data = file.header.checked_add((LOCAL + usize::from(file.name_length)) as u64);
+            let data = file
+                .header
+                .checked_add((LOCAL + usize::from(file.name_length)) as u64);
             let least = data.and_then(|of| of.checked_add(file.packed));
             if least.is_none_or(|of| of > end) {
                 let name = utf8_or_windows(raw_name(names, &file));
@@ -197,10 +199,15 @@ impl Archive {
 
     /// The bytes of a file, as many as it states.
     pub(crate) fn unpack(&self, file: usize, budget: &mut Budget) -> Result<Vec<u8>, Error> {
-        let File { packed, size, method, checksum, .. } = self.directory.files[file];
-        let damaged = |problem: &str, expected: &str| {
-            Err(self.directory.damaged(file, problem, expected))
-        };
+        let File {
+            packed,
+            size,
+            method,
+            checksum,
+            ..
+        } = self.directory.files[file];
+        let damaged =
+            |problem: &str, expected: &str| Err(self.directory.damaged(file, problem, expected));
         budget.take(size)?;
         // Blocks that are not compressed have 5 bytes more each.
         if packed > size.saturating_add(size / 16 + 65_536) {
@@ -214,13 +221,12 @@ impl Archive {
             DEFLATED => {
                 let found =
                     miniz_oxide::inflate::decompress_to_vec_with_limit(bytes, size as usize);
-                match found.ok().filter(|bytes| bytes.len() as u64 == size) {
-                    Some(found) => found,
-                    None => {
-                        let expected = format!("{size} bytes when unpacked");
-                        return damaged("its compressed bytes are damaged", &expected);
-                    }
-                }
+                let whole = found.ok().filter(|bytes| bytes.len() as u64 == size);
+                let Some(whole) = whole else {
+                    let expected = format!("{size} bytes when unpacked");
+                    return damaged("its compressed bytes are damaged", &expected);
+                };
+                whole
             }
             _ => {
                 let problem = format!("compressed by method {method}");
@@ -236,7 +242,12 @@ impl Archive {
     /// The compressed bytes of a file, and where they begin in these. They follow its local header,
     /// which names the same file.
     fn packed(&self, file: usize) -> Result<(Cow<'_, [u8]>, usize), Error> {
-        let File { header, end, packed, .. } = self.directory.files[file];
+        let File {
+            header,
+            end,
+            packed,
+            ..
+        } = self.directory.files[file];
         let name = self.directory.raw_name(file);
         let packed = packed as usize;
         let wanted = LOCAL + name.len() + USUAL_EXTRA + packed;
@@ -256,7 +267,9 @@ impl Archive {
             let problem = "its bytes are also another file's";
             return Err(self.directory.damaged(file, problem, "its own"));
         }
-        let found = self.source.read(header + data as u64, packed, Format::Zip)?;
+        let found = self
+            .source
+            .read(header + data as u64, packed, Format::Zip)?;
         Ok((found, 0))
     }
 }

@@ -325,6 +325,43 @@ fn records_of_ardf_are_found_by_their_checksums() {
 }
 
 #[test]
+fn hdf5_of_afmformats_is_cut_into_segments_by_its_mode() {
+    let document = open(samples::hdf5());
+    assert_eq!((document.format, document.curve_count()), (Format::Hdf5, 2));
+    let grid = document.grid.expect("a grid");
+    assert_eq!(grid.shape, [2, 1]);
+    let first = curve(&document, 0);
+    assert_eq!(styles(&first), [Style::Approach, Style::Retract]);
+    assert_eq!(
+        (first.spring_constant, first.sensitivity),
+        (Some(0.04), Some(5e-8))
+    );
+    assert_eq!((first.pixel, first.position), (Some(0), Some([0.0; 2])));
+    // Nine points at 1 kHz.
+    assert_eq!(first.segments[1].duration, Some(0.009));
+    assert_eq!(
+        distance(&first, 1, 1e-9),
+        [1000, 1188, 1375, 1563, 1750, 1938, 2125, 2313, 2500]
+    );
+    // What is called a force stays one: 1 nN where it is deepest.
+    let force = first.deflection_in(&first.segments[0]).expect("a force");
+    assert_eq!((force.unit.as_str(), force.values[14]), ("N", 1e-9));
+    let second = curve(&document, 1);
+    assert_eq!(
+        styles(&second),
+        [Style::Approach, Style::Pause, Style::Retract]
+    );
+    // The grid tells the pixel of a curve that has only its position.
+    assert_eq!(
+        (second.pixel, second.position),
+        (Some(1), Some([2e-6, 0.0]))
+    );
+    let time = second.segments[2].channel("time").expect("a time");
+    assert_eq!(steps(&time.values, 1e-3), [16, 17, 18, 19, 20, 21, 22, 23]);
+    assert_eq!(time.unit, "s");
+}
+
+#[test]
 fn files_in_an_archive_are_read_each_by_itself() {
     let files = [
         ("b.csv".to_owned(), samples::workshop(1)),
@@ -353,7 +390,11 @@ fn what_is_not_read_is_named() {
     let message = |bytes: &[u8]| read(bytes.to_vec()).expect_err("not read").to_string();
     assert!(message(b"distance,amplitude\n").contains("the text \"distance,amplitu\""));
     assert!(message(b"").contains("the file is empty"));
-    assert!(message(b"\x89HDF\r\n\x1a\n....afmformats").contains("HDF5 file of afmformats"));
+    let other = samples::hdf5();
+    let at = other.windows(10).position(|of| of == b"afmformats");
+    let mut other = other.clone();
+    other[at.expect("the software")] = b'A';
+    assert!(message(&other).contains("an HDF5 file of `Afmformats`"));
     let calibration = [(
         "header.properties".to_owned(),
         b"type=calibration\n".to_vec(),

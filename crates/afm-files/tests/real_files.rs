@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use afm_files::{Curve, Document, Image, recognise};
+use afm_files::{Curve, Document, Error, Image, recognise};
 use serde_json::Value;
 
 /// Relative agreement; the reference has 12 digits.
@@ -94,7 +94,8 @@ fn check(file: &str, bytes: &[u8], expected: &Value, failures: &mut Vec<String>)
         Ok(document) if is_afm => document,
         Ok(_) => return report("read, but it is not a recording that is read".to_owned()),
         Err(error) if is_afm => return report(error.to_string()),
-        Err(error) => return println!("{file}: not read: {error}"),
+        Err(error @ Error::Unsupported { .. }) => return println!("{file}: not read: {error}"),
+        Err(error) => return report(format!("its content is not named: {error}")),
     };
     let mut all = Comparison { file, failures };
     all.document(&document, expected);

@@ -505,6 +505,7 @@ pub(crate) fn ardf() -> Vec<u8> {
 /// Every sample by its name, but those that are archives.
 pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
     vec![
+        ("hdf5", hdf5()),
         ("jpk image", jpk_image()),
         ("nanosurf", nanosurf()),
         ("igor curve", igor_curve()),
@@ -534,4 +535,11 @@ pub(crate) fn archives() -> Vec<(&'static str, Files)> {
         ("jpk map", jpk_map()),
         ("workshop map", map.to_vec()),
     ]
+}
+
+/// A map of two curves that afmformats 0.18.7 and h5py 3.16 wrote, packed by zlib. The rows of the first
+/// are as afmformats stores them; those of the second in chunks, as a whole, and in the header.
+pub(crate) fn hdf5() -> Vec<u8> {
+    let packed = include_bytes!("afmformats.h5.zlib");
+    miniz_oxide::inflate::decompress_to_vec_zlib(packed).expect("a zlib stream")
 }

@@ -261,10 +261,7 @@ impl CurveSource for Volume {
         let Some(first) = parts.first() else {
             return Ok(curve);
         };
-        let [_, line, point] = [first.numbers[0], first.numbers[1], first.numbers[2]];
-        curve.pixel = self
-            .grid
-            .map(|grid| line.saturating_mul(grid.shape[0]).saturating_add(point));
+        curve.pixel = self.pixel(number, limits);
         let mut cuts: Vec<usize> = first.numbers[5..]
             .iter()
             .copied()
@@ -306,5 +303,10 @@ impl CurveSource for Volume {
         }
         finish(&mut curve, &igor::NAMES);
         Ok(curve)
+    }
+
+    fn pixel(&self, number: usize, _: Limits) -> Option<usize> {
+        let [_, line, point, ..] = self.curves[number].first()?.numbers;
+        self.grid?.pixel([point, line])
     }
 }

@@ -46,15 +46,13 @@ impl Encoding {
 
     fn bits(self, bytes: &[u8]) -> u64 {
         let mut raw = [0_u8; 8];
-        for (k, byte) in bytes.iter().enumerate() {
-            let place = if self.big_endian {
-                bytes.len() - 1 - k
-            } else {
-                k
-            };
-            raw[place] = *byte;
+        if self.big_endian {
+            raw[8 - bytes.len()..].copy_from_slice(bytes);
+            u64::from_be_bytes(raw)
+        } else {
+            raw[..bytes.len()].copy_from_slice(bytes);
+            u64::from_le_bytes(raw)
         }
-        u64::from_le_bytes(raw)
     }
 
     fn one(self, bytes: &[u8]) -> f64 {

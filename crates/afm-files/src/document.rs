@@ -1,6 +1,7 @@
 //! What a file holds: curves, images and spectra, in SI units.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use serde::Serialize;
 
@@ -25,6 +26,8 @@ pub struct Document {
     /// The instrument's settings: name and value as in the file.
     pub settings: Vec<(String, String)>,
     pub(crate) curves: Box<dyn CurveSource>,
+    /// Pixel and number of each curve, in the order of the pixels; made when it is needed.
+    pub(crate) by_pixel: OnceLock<Vec<(usize, usize)>>,
     pub(crate) limits: Limits,
 }
 
@@ -34,6 +37,8 @@ pub(crate) trait CurveSource: fmt::Debug + Send + Sync {
     fn count(&self) -> usize;
     /// Decodes one of them.
     fn curve(&self, number: usize, limits: Limits) -> Result<Curve, Error>;
+    /// The pixel of one of them, which costs less than the curve; `None` if it has none or is damaged.
+    fn pixel(&self, number: usize, limits: Limits) -> Option<usize>;
 }
 
 impl CurveSource for Vec<Curve> {
@@ -43,6 +48,10 @@ impl CurveSource for Vec<Curve> {
 
     fn curve(&self, number: usize, _: Limits) -> Result<Curve, Error> {
         Ok(self[number].clone())
+    }
+
+    fn pixel(&self, number: usize, _: Limits) -> Option<usize> {
+        self[number].pixel
     }
 }
 
@@ -58,6 +67,7 @@ impl Document {
             notes: Vec::new(),
             settings: Vec::new(),
             curves: Box::new(Vec::new()),
+            by_pixel: OnceLock::new(),
             limits,
         }
     }
@@ -94,6 +104,28 @@ impl Document {
         self.curves.curve(number, self.limits)
     }
 
+    /// The number of the curve at a column and a row of the grid, for [`curve`](Self::curve); `None` if
+    /// the map has no curve there.
+    ///
+    /// In a map with gaps the first call reads the headers of all curves.
+    pub fn number_at(&self, cell: [usize; 2]) -> Option<usize> {
+        let pixel = self.grid?.pixel(cell)?;
+        let pixel_of = |number: usize| self.curves.pixel(number, self.limits);
+        // In a map without gaps the curves have the numbers of their pixels.
+        if pixel < self.curve_count() && pixel_of(pixel) == Some(pixel) {
+            return Some(pixel);
+        }
+        let by_pixel = self.by_pixel.get_or_init(|| {
+            let all = 0..self.curve_count();
+            let mut pairs: Vec<_> = all.filter_map(|of| Some((pixel_of(of)?, of))).collect();
+            pairs.sort_unstable();
+            pairs
+        });
+        let at = by_pixel.partition_point(|(of, _)| *of < pixel);
+        let found = by_pixel.get(at).filter(|(of, _)| *of == pixel);
+        found.map(|(_, number)| *number)
+    }
+
     /// Decodes all curves in sequence.
     pub fn curves(&self) -> impl Iterator<Item = Result<Curve, Error>> + '_ {
         (0..self.curve_count()).map(|number| self.curve(number))
@@ -123,6 +155,46 @@ pub struct Curve {
     pub deflection: Option<String>,
     /// What a reader of the numbers should know.
     pub notes: Vec<String>,
+}
+
+/// The grid of a file's curves, by their positions: places of equal distances in rows and columns, at
+/// least two of them; `None` if they do not form one.
+pub(crate) fn grid_of(positions: &[[f64; 2]]) -> Option<Grid> {
+    // Shares of a step that a position may be away from its place.
+    const TOLERANCE: f64 = 0.05;
+    let mut grid = Grid {
+        shape: [1; 2],
+        size: [0.0; 2],
+        centre: [0.0; 2],
+        angle: 0.0,
+        back_and_forth: false,
+    };
+    for k in 0..2 {
+        let all = || positions.iter().map(|of| of[k]);
+        let (low, high) = (
+            all().fold(f64::INFINITY, f64::min),
+            all().fold(f64::NEG_INFINITY, f64::max),
+        );
+        let above = |of: &f64| *of > low + (high - low) * 1e-6;
+        let step = all().filter(above).fold(f64::INFINITY, f64::min) - low;
+        grid.centre[k] = 0.5 * (low + high);
+        if step.is_finite() && step > 0.0 {
+            let steps = ((high - low) / step).round();
+            grid.shape[k] = steps as usize + 1;
+            grid.size[k] = (high - low) * (steps + 1.0) / steps;
+        }
+    }
+    let is_near = |position: &[f64; 2]| {
+        let pixel = grid.cell_at(*position).and_then(|of| grid.pixel(of));
+        pixel.and_then(|of| grid.position(of)).is_some_and(|place| {
+            (0..2).all(|k| {
+                let share = grid.size[k] / grid.shape[k] as f64;
+                (place[k] - position[k]).abs() <= TOLERANCE * share
+            })
+        })
+    };
+    let is_grid = grid.places() == positions.len() && positions.len() > 1;
+    (is_grid && positions.iter().all(is_near)).then_some(grid)
 }
 
 /// What a file says of the lever of all its curves.
@@ -455,6 +527,22 @@ mod tests {
             (x - 11.0).abs() < 1e-12 && (y + 0.5).abs() < 1e-12,
             "{x} {y}"
         );
+    }
+
+    #[test]
+    fn positions_tell_their_grid() {
+        let at = |k: usize| [1e-6 * (k % 3) as f64, 2e-6 * (k / 3) as f64];
+        let positions: Vec<[f64; 2]> = (0..6).map(at).collect();
+        let grid = grid_of(&positions).expect("a grid");
+        assert_eq!(grid.shape, [3, 2]);
+        for (k, position) in positions.iter().enumerate() {
+            let found = grid.position(k).expect("a place of the grid");
+            assert!((0..2).all(|of| (found[of] - position[of]).abs() < 1e-15));
+        }
+        assert_eq!(grid_of(&positions[..5]), None);
+        assert_eq!(grid_of(&[[0.0; 2]]), None);
+        assert_eq!(grid_of(&[[0.0; 2], [0.0; 2]]), None);
+        assert_eq!(grid_of(&[[f64::NAN; 2], [0.0; 2]]), None);
     }
 
     #[test]

@@ -94,7 +94,6 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-use limits::Budget;
 use source::Source;
 use zip::Archive;
 
@@ -177,7 +176,7 @@ fn read_source(source: Source, limits: Limits) -> Result<Document, Error> {
         });
     };
     drop(head);
-    let whole = |source: Source| source.whole(&mut Budget::new(limits), format);
+    let whole = |source: Source| source.whole(limits, format);
     match format {
         Format::Zip | Format::Jpk => {
             let archive = Archive::open(source)?;

@@ -5,8 +5,7 @@ use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::{Mutex, PoisonError};
 
-use crate::limits::Budget;
-use crate::{Error, Format, Place};
+use crate::{Error, Format, Limits, Place};
 
 /// Bytes that are read by their place.
 pub(crate) trait ReadAt {
@@ -97,11 +96,17 @@ impl Source {
     }
 
     /// All bytes, for formats that are read as a whole.
-    pub(crate) fn whole(self, budget: &mut Budget, format: Format) -> Result<Vec<u8>, Error> {
+    pub(crate) fn whole(self, limits: Limits, format: Format) -> Result<Vec<u8>, Error> {
         if let Kind::Memory(bytes) = self.kind {
             return Ok(bytes);
         }
-        budget.take(self.length)?;
+        if self.length > limits.decoded_bytes {
+            return Err(Error::Limit {
+                quantity: "bytes of a file that is read as a whole",
+                found: self.length,
+                limit: limits.decoded_bytes,
+            });
+        }
         Ok(self.read(0, self.length as usize, format)?.into_owned())
     }
 }

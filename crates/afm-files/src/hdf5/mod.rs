@@ -59,6 +59,13 @@ impl Settings {
         })
     }
 
+    /// The pixel of a curve, by its column and row or by its position.
+    fn pixel(&self, grid: &Grid) -> Option<usize> {
+        let cell = self.both("grid index").map(|of| of.map(|k| k as usize));
+        let cell = cell.or_else(|| grid.cell_at(self.both("position")?));
+        grid.pixel(cell?)
+    }
+
     /// Name and value as texts, for a document.
     fn shown(self, prefix: &str) -> impl Iterator<Item = (String, String)> {
         let shown = |value: Value| match value {
@@ -154,11 +161,7 @@ impl CurveSource for Curves {
         curve.spring_constant = settings.number("spring constant").filter(|of| *of > 0.0);
         curve.sensitivity = settings.number("sensitivity").filter(|of| *of > 0.0);
         curve.position = settings.both("position");
-        let cell = settings.both("grid index").map(|of| of.map(|k| k as usize));
-        curve.pixel = self.grid.and_then(|grid| match cell {
-            Some(cell) => grid.pixel(cell),
-            None => grid.pixel(grid.cell_at(curve.position?)?),
-        });
+        curve.pixel = self.grid.and_then(|grid| settings.pixel(&grid));
         let links = reader.links(&group)?;
         at_most(links.len(), MAX_CHANNELS, "channels in a curve")?;
         let mut channels = Vec::new();
@@ -182,6 +185,13 @@ impl CurveSource for Curves {
         split(&mut curve, &channels, marks.as_deref(), &settings)?;
         finish(&mut curve, &NAMES);
         Ok(curve)
+    }
+
+    fn pixel(&self, number: usize, limits: Limits) -> Option<usize> {
+        let budget = &mut Budget::new(limits);
+        let mut reader = Reader::new(&self.source, budget);
+        let group = reader.object(self.groups[number].1).ok()?;
+        Settings(reader.attributes(&group).ok()?).pixel(&self.grid?)
     }
 }
 

@@ -160,12 +160,9 @@ impl CurveSource for File {
             }
         }
         at_most(segments.len(), MAX_SEGMENTS, "segments in a curve")?;
-        // A single curve has its position in the header of the file.
-        let own = own.or_else(|| self.archive.find(HEADER));
-        if let Some(file) = own {
-            let own = parse(&self.archive.unpack(file, budget)?)?;
+        if let Some(header) = self.header(own, budget)? {
             let of_end = |end: &str| {
-                let found = own.iter().find(|(key, _)| key.ends_with(end))?;
+                let found = header.iter().find(|(key, _)| key.ends_with(end))?;
                 crate::text::number(found.1)
             };
             let (x, y) = (
@@ -173,7 +170,7 @@ impl CurveSource for File {
                 of_end("series.header.position.y"),
             );
             curve.position = x.zip(y).map(|(x, y)| [x, y]);
-            curve.pixel = of_end("header.position-index").map(|of| of as usize);
+            curve.pixel = pixel(&header);
         }
         for (segment, files) in segments {
             self.segment(&mut curve, segment, &files, budget)?;
@@ -181,6 +178,23 @@ impl CurveSource for File {
         finish(&mut curve, &NAMES);
         Ok(curve)
     }
+
+    fn pixel(&self, number: usize, limits: Limits) -> Option<usize> {
+        let place = self.curves[number];
+        let own = (place.first..place.end)
+            .find(|file| self.archive.name(*file).get(place.prefix..) == Some(HEADER));
+        let header = self.header(own, &mut Budget::new(limits)).ok()??;
+        pixel(&header)
+    }
+}
+
+/// The pixel of a curve, from its header.
+fn pixel(header: &Properties) -> Option<usize> {
+    let found = header
+        .iter()
+        .find(|(key, _)| key.ends_with("header.position-index"));
+    let index = crate::text::number(found?.1)?;
+    (index >= 0.0).then_some(index as usize)
 }
 
 /// Files of a segment in the archive.
@@ -206,6 +220,13 @@ fn segment_file(name: &str) -> Option<(usize, Part<'_>)> {
 }
 
 impl File {
+    /// The header of a curve; a single curve has it in that of the file.
+    fn header(&self, own: Option<usize>, budget: &mut Budget) -> Result<Option<Properties>, Error> {
+        let file = own.or_else(|| self.archive.find(HEADER));
+        file.map(|of| parse(&self.archive.unpack(of, budget)?))
+            .transpose()
+    }
+
     fn segment(
         &self,
         curve: &mut Curve,

@@ -3,7 +3,7 @@
 use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, Document, Segment, Style};
 use crate::table::{Heading, headed};
-use crate::text::{any, number};
+use crate::text::{any, number_with_comma};
 use crate::{Error, Format, Limits};
 
 const NAMES: Names = Names {
@@ -36,7 +36,7 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
             Channel::new(name, unit, values)
         })
         .collect();
-    let setting = |key: &str| document.setting(key).and_then(number);
+    let setting = |key: &str| document.setting(key).and_then(number_with_comma);
     let mut curve = Curve::empty(0);
     curve.spring_constant = setting("k (N/m)").filter(|of| *of > 0.0);
     let [x, y] = ["X-position (um)", "Y-position (um)"].map(setting);

@@ -20,6 +20,14 @@ use crate::text::{leading_number, number, utf8_or_windows};
 use crate::{Error, Format, Limits};
 
 const AXIS: &str = "commanded Z";
+const TIME: &str = "Time";
+/// Frames of a curve in the order of time: name, style, and the setting with the duration (s).
+const FRAMES: [(&str, Style, &str); 4] = [
+    ("spec forward", Style::Approach, "FwModTime"),
+    ("spec fwd pause", Style::Pause, "FwPauseTime"),
+    ("spec backward", Style::Retract, "BwModTime"),
+    ("spec bwd pause", Style::Pause, "BwPauseTime"),
+];
 const NAMES: Names = Names {
     measured: &["Z-Axis Sensor"],
     commanded: &["Z-Axis", AXIS],
@@ -86,12 +94,12 @@ impl Data {
 #[derive(Debug)]
 struct Spectroscopy {
     file: Source,
-    /// Channels with the style of their segment.
-    channels: Vec<(Style, Data)>,
+    /// Channels with the number of their frame, in the order of the frames.
+    channels: Vec<(usize, Data)>,
     count: usize,
     grid: Option<Grid>,
     lever: Lever,
-    durations: [Option<f64>; 2],
+    durations: [Option<f64>; FRAMES.len()],
 }
 
 pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
@@ -123,15 +131,13 @@ pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
             "" => data.group.to_lowercase(),
             frame => frame.to_lowercase(),
         };
-        let is_height = data.text("Dim0Name").starts_with('Z') || data.text("Dim0Unit") == "m";
-        if frame.starts_with("spec ") && is_height {
-            let style = match frame.as_str() {
-                "spec forward" => Style::Approach,
-                "spec backward" => Style::Retract,
-                _ => Style::Pause,
-            };
+        // The axis of a pause is the time.
+        let is_curve =
+            data.text("Dim0Name").starts_with('Z') || ["m", "s"].contains(&data.text("Dim0Unit"));
+        let known = FRAMES.iter().position(|(name, ..)| *name == frame);
+        if let Some(known) = known.filter(|_| is_curve) {
             at_most(data.lines, MAX_CURVES, "curves in a file")?;
-            spectroscopy.push((style, data));
+            spectroscopy.push((known, data));
         } else if data.text("Dim0Unit") == "Hz" {
             budget.numbers(2 * data.points)?;
             document.spectra.push(spectrum(&data, &file)?);
@@ -164,6 +170,7 @@ pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
         let (value, unit) = quantity.split_once("]*[")?;
         (unit.trim_end_matches(']') == "N/m").then(|| number(value))?
     });
+    spectroscopy.sort_by_key(|(frame, _)| *frame);
     let count = spectroscopy
         .iter()
         .map(|(_, data)| data.lines)
@@ -178,7 +185,7 @@ pub(crate) fn read(file: Source, limits: Limits) -> Result<Document, Error> {
             spring_constant: stiffness.filter(|of| *of > 0.0),
             sensitivity: full_scale.map(|of| of / 10.0).filter(|of| *of > 0.0),
         },
-        durations: [duration("FwModTime"), duration("BwModTime")],
+        durations: FRAMES.map(|(_, _, key)| duration(key).filter(|of| *of > 0.0)),
     });
     Ok(document)
 }
@@ -371,31 +378,41 @@ impl CurveSource for Spectroscopy {
     fn curve(&self, number: usize, limits: Limits) -> Result<Curve, Error> {
         let mut curve = self.lever.curve(number, self.grid.as_ref());
         let budget = &mut Budget::new(limits);
-        for (style, data) in self.channels.iter().filter(|(_, data)| number < data.lines) {
+        let mut last_frame = None;
+        for (frame, data) in self.channels.iter().filter(|(_, data)| number < data.lines) {
             let (points, low, range) = data.axis(number);
-            budget.numbers(2 * points)?;
+            budget.numbers(3 * points)?;
+            let (_, style, _) = FRAMES[*frame];
             let in_time = |mut values: Vec<f64>| {
                 // The way back lies along the axis: its first number is the farthest point.
-                if *style == Style::Retract {
+                if style == Style::Retract {
                     values.reverse();
                 }
                 values
             };
-            let known = curve.segments.iter().position(|of| of.style == *style);
-            let at = known.unwrap_or_else(|| {
+            if last_frame.replace(*frame) != Some(*frame) {
                 let last = points.max(2) - 1;
                 let axis = (0..points).map(|k| low + range * k as f64 / last as f64);
                 let axis = in_time(axis.collect());
+                let channels = if data.text("Dim0Unit") == "s" {
+                    let before = curve.segments.last().and_then(|of| of.channel(AXIS));
+                    let height = before.and_then(|of| of.values.last()).copied();
+                    let height = height.map(|of| Channel::new(AXIS, "m", vec![of; points]));
+                    let time = Channel::new(TIME, "s", axis);
+                    height.into_iter().chain([time]).collect()
+                } else {
+                    vec![Channel::new(AXIS, data.text("Dim0Unit"), axis)]
+                };
                 curve.segments.push(Segment {
-                    style: *style,
+                    style,
                     label: String::new(),
-                    duration: self.durations[usize::from(*style != Style::Approach)]
-                        .filter(|_| *style != Style::Pause),
-                    channels: vec![Channel::new(AXIS, data.text("Dim0Unit"), axis)],
+                    duration: self.durations[*frame],
+                    channels,
                 });
-                curve.segments.len() - 1
-            });
-            let segment = &mut curve.segments[at];
+            }
+            let Some(segment) = curve.segments.last_mut() else {
+                continue;
+            };
             let name = match data.text("Dim2Name") {
                 "" => "channel",
                 name => name,

@@ -5,7 +5,7 @@ use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, Document, Segment, Style};
 use crate::limits::Budget;
 use crate::table::{Layout, rows};
-use crate::text::{any, number};
+use crate::text::{any, number_with_comma};
 use crate::{Error, Format, Limits};
 
 const NAMES: Names = Names {
@@ -25,7 +25,7 @@ pub(crate) fn begins(head: &[u8]) -> bool {
         return false;
     };
     let cells: Vec<&str> = line.trim_end().split('\t').collect();
-    let is_number = |of: &&str| of.contains(',') && number(&of.replace(',', ".")).is_some();
+    let is_number = |of: &&str| of.contains(',') && number_with_comma(of).is_some();
     cells.len() == 3 && cells.iter().all(is_number)
 }
 
@@ -33,7 +33,6 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     let layout = Layout {
         format: Format::NtMdtText,
         separator: Some('\t'),
-        decimal_comma: true,
         columns: 3,
     };
     let text = any(bytes);

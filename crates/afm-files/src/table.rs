@@ -3,7 +3,7 @@
 use crate::document::Document;
 use crate::error::Place;
 use crate::limits::{Budget, MAX_CHANNELS, MAX_HEADER, MAX_LINE, at_most};
-use crate::text::number;
+use crate::text::{number, number_with_comma};
 use crate::{Error, Format};
 
 /// Columns of a table.
@@ -19,15 +19,14 @@ pub(crate) struct Table {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
     pub(crate) format: Format,
-    /// Between numbers; `None` for any blanks.
+    /// Between numbers; `None` for any blanks. Commas that separate nothing are decimal ones.
     pub(crate) separator: Option<char>,
-    pub(crate) decimal_comma: bool,
     /// Columns, if the rows must have so many at most.
     pub(crate) columns: usize,
 }
 
 /// Reads the rows of a table; the number of the first line is `first`. An empty cell ends its column.
-/// A last line that is cut off is left out with a note.
+/// Of a last line that is cut off the whole numbers are kept, with a note.
 pub(crate) fn rows<'a>(
     lines: impl Iterator<Item = &'a str>,
     first: usize,
@@ -45,21 +44,22 @@ pub(crate) fn rows<'a>(
     while let Some((k, line)) = lines.next() {
         at_most(line.len(), MAX_LINE, "bytes in a line")?;
         budget.numbers(layout.columns)?;
-        let Some(row) = row(line, layout) else {
-            if lines.peek().is_none() && k > 0 {
-                table.notes.push(format!(
-                    "the last line {} is cut off and left out",
-                    first + k
-                ));
-                break;
+        let (row, is_whole) = row(line, layout);
+        if !is_whole {
+            if lines.peek().is_some() || k == 0 {
+                let shown: String = line.chars().take(60).collect();
+                let expected = format!("at most {} numbers", layout.columns);
+                let place = Place::Line(first + k);
+                return Err(layout
+                    .format
+                    .damaged(place, format!("the text `{shown}`"), expected));
             }
-            let shown: String = line.chars().take(60).collect();
-            let expected = format!("at most {} numbers", layout.columns);
-            let place = Place::Line(first + k);
-            return Err(layout
-                .format
-                .damaged(place, format!("the text `{shown}`"), expected));
-        };
+            let whole = row.iter().flatten().count();
+            table.notes.push(format!(
+                "the last line {} is cut off: {whole} of its numbers are read",
+                first + k
+            ));
+        }
         for (column, value) in table.columns.iter_mut().zip(row) {
             column.extend(value);
         }
@@ -106,7 +106,6 @@ pub(crate) fn headed<'a>(
     let layout = Layout {
         format,
         separator: Some(heading.separator),
-        decimal_comma: false,
         columns: names.len(),
     };
     let lines = lines.map(|(_, line)| line);
@@ -120,24 +119,27 @@ pub(crate) fn headed<'a>(
     Ok((names, table.columns))
 }
 
-fn row(line: &str, layout: &Layout) -> Option<Vec<Option<f64>>> {
+/// The numbers of a line up to the first cell that is none, and whether that is the whole line.
+fn row(line: &str, layout: &Layout) -> (Vec<Option<f64>>, bool) {
     let cells: Vec<&str> = match layout.separator {
         Some(separator) => line.split(separator).collect(),
         None => line.split_whitespace().collect(),
     };
-    let value = |cell: &str| -> Option<Option<f64>> {
+    let value = |cell: &&str| -> Option<Option<f64>> {
         let cell = cell.trim();
         if cell.is_empty() {
             return Some(None);
         }
-        if layout.decimal_comma {
-            return number(&cell.replace(',', ".")).map(Some);
+        if layout.separator == Some(',') {
+            return number(cell).map(Some);
         }
-        number(cell).map(Some)
+        number_with_comma(cell).map(Some)
     };
-    let row: Vec<Option<f64>> = cells.into_iter().map(value).collect::<Option<_>>()?;
-    let (kept, rest) = row.split_at(row.len().min(layout.columns));
-    rest.iter().all(Option::is_none).then(|| kept.to_vec())
+    let mut row: Vec<Option<f64>> = cells.iter().map_while(value).collect();
+    let is_whole = row.len() == cells.len();
+    let rest = row.split_off(row.len().min(layout.columns));
+    let fits = rest.iter().all(Option::is_none);
+    (row, is_whole && fits)
 }
 
 #[cfg(test)]
@@ -149,7 +151,6 @@ mod tests {
         let layout = Layout {
             format: Format::Workshop,
             separator: Some(','),
-            decimal_comma: false,
             columns: 2,
         };
         rows(
@@ -163,8 +164,24 @@ mod tests {
     #[test]
     fn columns_may_end_early_and_the_last_line_may_be_cut() {
         let table = read("1,2\n3,\n\n5,-").expect("a table");
-        assert_eq!(table.columns, [vec![1.0, 3.0], vec![2.0]]);
-        assert!(table.notes[0].contains("line 13"), "{:?}", table.notes);
+        assert_eq!(table.columns, [vec![1.0, 3.0, 5.0], vec![2.0]]);
+        let note = "the last line 13 is cut off: 1 of its numbers are read";
+        assert_eq!(table.notes, [note]);
+    }
+
+    #[test]
+    fn commas_that_separate_nothing_are_decimal() {
+        let layout = Layout {
+            format: Format::Chiaro,
+            separator: Some('\t'),
+            columns: 2,
+        };
+        assert_eq!(
+            row("1,5\t-2.5e3", &layout),
+            (vec![Some(1.5), Some(-2500.0)], true)
+        );
+        assert_eq!(row("1,5,5\t2", &layout), (vec![], false));
+        assert_eq!(row("1\t2\t3", &layout), (vec![Some(1.0), Some(2.0)], false));
     }
 
     #[test]

@@ -49,6 +49,11 @@ pub(crate) fn number(text: &str) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
+/// The finite number that a text is, with a decimal point or comma.
+pub(crate) fn number_with_comma(text: &str) -> Option<f64> {
+    number(text).or_else(|| number(&text.replace(',', ".")))
+}
+
 /// The finite number at the beginning of a text, and what follows it.
 pub(crate) fn leading_number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim_start();

@@ -37,7 +37,6 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     let layout = Layout {
         format: Format::JpkThermal,
         separator: None,
-        decimal_comma: false,
         columns: names.len(),
     };
     let lines = text.lines().skip(header.len());

@@ -3,7 +3,7 @@
 use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, Document, Segment, Style};
 use crate::table::{Heading, headed};
-use crate::text::{any, number};
+use crate::text::{any, number_with_comma};
 use crate::{Error, Format, Limits};
 
 const NAMES: Names = Names {
@@ -25,7 +25,7 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
     let text = any(bytes);
     let mut document = Document::new(Format::Workshop, limits);
     let (names, columns) = headed(&text, &HEADING, &mut document)?;
-    let setting = |key: &str| document.setting(key).and_then(number);
+    let setting = |key: &str| document.setting(key).and_then(number_with_comma);
     let mut curve = Curve::empty(setting("Point").map_or(1, |of| of as usize));
     let [x, y] = ["X, um", "Y, um"].map(setting);
     curve.position = x.zip(y).map(|(x, y)| [1e-6 * x, 1e-6 * y]);

@@ -2,7 +2,7 @@
 
 mod samples;
 
-use afm_files::{Curve, DistanceSource, Document, Error, Format, Style, read};
+use afm_files::{Curve, DistanceSource, Document, Error, Format, Limits, Style, read, read_from};
 
 fn open(bytes: Vec<u8>) -> Document {
     read(bytes).unwrap_or_else(|error| panic!("{error}"))
@@ -91,6 +91,10 @@ fn a_jpk_map_has_its_grid_positions_and_image() {
             "{x} {y} {u} {v}"
         );
     }
+    // Pixel 3 of a grid that runs back and forth is the first of its second row.
+    assert_eq!(document.number_at([0, 1]), Some(1));
+    assert_eq!(document.number_at([0, 0]), Some(0));
+    assert_eq!(document.number_at([1, 0]), None);
     assert_eq!(document.images[0].name, "height retrace");
     assert_eq!(
         document
@@ -125,26 +129,37 @@ fn a_nanosurf_map_has_each_line_with_its_own_length() {
     let document = open(samples::nanosurf());
     assert_eq!(document.curve_count(), 2);
     let first = curve(&document, 0);
-    assert_eq!(styles(&first), [Style::Approach, Style::Retract]);
+    // The pause is the last group of the file.
+    assert_eq!(
+        styles(&first),
+        [Style::Approach, Style::Pause, Style::Retract]
+    );
     assert_eq!(
         (first.spring_constant, first.sensitivity),
         (Some(2.0), Some(5e-8))
     );
     assert_eq!(deflection(&first, 0, 0.5e-9), [0, 1, 2]);
+    assert_eq!(deflection(&first, 1, 0.5e-9), [2, 4]);
+    assert_eq!(first.segments[1].duration, Some(0.1));
+    let time = first.segments[1].channel("Time").expect("a time");
+    assert_eq!((time.unit.as_str(), &*time.values), ("s", &[0.0, 0.1][..]));
     // The way back lies along the axis in the file.
-    assert_eq!(deflection(&first, 1, 0.5e-9), [1, 2, 3]);
+    assert_eq!(deflection(&first, 2, 0.5e-9), [1, 2, 3]);
     // The sensor has no way back: the axis is the distance of the whole curve.
     assert_eq!(
         first.distance.as_ref().map(|of| of.source),
         Some(DistanceSource::Commanded)
     );
-    assert_eq!(distance(&first, 1, 1e-6), [2, 1, 0]);
+    assert_eq!(distance(&first, 1, 1e-6), [2, 2]);
+    assert_eq!(distance(&first, 2, 1e-6), [2, 1, 0]);
     let second = curve(&document, 1);
     assert_eq!(deflection(&second, 0, 0.5e-9), [10, 11]);
     assert_eq!(distance(&second, 0, 1e-6), [1, 2]);
     assert_eq!(second.segments[0].duration, Some(0.25));
     let [x, y] = second.position.expect("a position");
     assert!((x - 1e-6).abs() < 1e-18 && y == 0.0, "{x} {y}");
+    assert_eq!(document.number_at([1, 0]), Some(1));
+    assert_eq!(document.number_at([2, 0]), None);
     assert_eq!(steps(&document.images[0].values, 1e-9), [3, 4, 1, 2]);
     assert_eq!(document.images[0].size, Some([1e-6, 2e-6]));
     assert_eq!(document.spectra[0].frequency, [0.0, 100.0, 200.0]);
@@ -372,6 +387,8 @@ fn files_in_an_archive_are_read_each_by_itself() {
     let document = open(samples::zip(&files));
     assert_eq!(document.format, Format::Zip);
     assert_eq!(document.images.len(), 1);
+    let grid = document.grid.expect("a grid, by the positions");
+    assert_eq!((grid.shape, document.number_at([1, 0])), ([2, 1], Some(1)));
     let names: Vec<(String, usize)> = document
         .curves()
         .map(|of| of.map(|of| (of.file, of.index)))
@@ -383,6 +400,51 @@ fn files_in_an_archive_are_read_each_by_itself() {
         "{:?}",
         document.notes
     );
+}
+
+#[test]
+fn a_file_on_the_disk_is_read_as_its_bytes() {
+    let archives = samples::archives().into_iter();
+    let archives = archives.map(|(name, files)| (name, samples::zip(&files)));
+    for (name, bytes) in samples::files().into_iter().chain(archives) {
+        let device = std::io::Cursor::new(bytes.clone());
+        let of_device = read_from(device, Limits::default());
+        let of_device = of_device.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let document = open(bytes);
+        assert_eq!(of_device.images, document.images, "{name}");
+        assert_eq!(of_device.spectra, document.spectra, "{name}");
+        assert_eq!(of_device.settings, document.settings, "{name}");
+        let curves = of_device.curves().collect::<Result<Vec<_>, _>>();
+        assert_eq!(curves, document.curves().collect(), "{name}");
+    }
+    let folder = afm_files::open(".".as_ref(), Limits::default()).expect_err("a folder");
+    assert!(folder.to_string().contains("`.`"), "{folder}");
+}
+
+#[test]
+fn threads_decode_curves_of_one_document() {
+    let document = open(samples::zip(&samples::jpk_map()));
+    let expected = curve(&document, 1);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| assert_eq!(curve(&document, 1), expected));
+        }
+    });
+}
+
+#[test]
+fn a_deflection_without_sensitivity_says_what_is_missing() {
+    let mut files = samples::jpk_force();
+    let shared = &mut files[1].1;
+    let text =
+        String::from_utf8_lossy(shared).replace("distance.defined=true", "distance.defined=false");
+    *shared = text.into_bytes();
+    let curve = curve(&open(samples::zip(&files)), 0);
+    assert_eq!((curve.sensitivity, curve.spring_constant), (None, None));
+    let deflection = curve.deflection_in(&curve.segments[0]);
+    assert_eq!(deflection.map(|of| of.unit.as_str()), Some("V"));
+    let note = "the deflection `vDeflection` is in V: the file has no sensitivity (InvOLS)";
+    assert!(curve.notes.iter().any(|of| of == note), "{:?}", curve.notes);
 }
 
 #[test]

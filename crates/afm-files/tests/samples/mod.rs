@@ -231,11 +231,12 @@ pub(crate) fn nanosurf() -> Vec<u8> {
     let axis = "Dim0Name=Z-Axis\nDim0Unit=m\nDim0Min=0\nDim0Range=2e-6\nLineDim1Points=2\nLineDim1Min=1e-6\nLineDim1Range=1e-6";
     let image = "Dim0Name=X*\nDim0Unit=m\nDim0Range=1e-6\nDim0Min=0\nDim1Unit=m\nDim1Range=2e-6";
     let mut header = String::from(
-        "[DataSet]\nGroupCount=4\nGr0-Name=Spec forward\nGr0-Count=2\nGr0-Ch0=DataSet-0:0\nGr0-Ch1=DataSet-0:1\n\
+        "[DataSet]\nGroupCount=5\nGr0-Name=Spec forward\nGr0-Count=2\nGr0-Ch0=DataSet-0:0\nGr0-Ch1=DataSet-0:1\n\
          Gr1-Name=Spec backward\nGr1-Count=1\nGr1-Ch0=DataSet-1:0\nGr2-Name=Scan forward\nGr2-Count=1\n\
          Gr2-Ch0=DataSet-2:0\nGr3-Name=Spectrum FFT\nGr3-Count=1\nGr3-Ch0=DataSet-3:0\n\
+         Gr4-Name=Spec fwd pause\nGr4-Count=1\nGr4-Ch0=DataSet-4:0\n\
          [DataSet\\Calibration\\Cantilever]\nProp0=D[2.0]*[N/m]\n[DataSet\\Calibration\\Scanhead]\n\
-         In5=5,TipSignalDC,Deflection,m,5e-7,0\n[DataSet\\Parameters\\Spectroscopy]\nFwModTime=D[0.25]*[s]\n\
+         In5=5,TipSignalDC,Deflection,m,5e-7,0\n[DataSet\\Parameters\\Spectroscopy]\nFwModTime=D[0.25]*[s]\nFwPauseTime=D[0.1]*[s]\n\
          [DataSet\\SpecInfos\\SpecMapTable]\nMap0=0;1e-6;0;0;2;1;0;1\n",
     );
     header += &channel("DataSet-0:0", "Deflection", "N", "65536e-9", 3, 2, axis);
@@ -251,14 +252,24 @@ pub(crate) fn nanosurf() -> Vec<u8> {
         1,
         "Dim0Unit=Hz\nDim0Min=0\nDim0Range=200",
     );
+    header += &channel(
+        "DataSet-4:0",
+        "Deflection",
+        "N",
+        "65536e-9",
+        2,
+        2,
+        "Dim0Name=Time\nDim0Unit=s\nDim0Min=0\nDim0Range=0.1",
+    );
     let mut file = header.into_bytes();
     file.extend(b"#!");
-    let numbers: [&[i16]; 5] = [
+    let numbers: [&[i16]; 6] = [
         &[0, 1, 2, 10, 11, 0],
         &[5, 6, 7, 8, 9, 0],
         &[3, 2, 1, 12, 13, 0],
         &[1, 2, 3, 4],
         &[7, 8, 9],
+        &[2, 4, 11, 11],
     ];
     for number in numbers.into_iter().flatten() {
         // −2¹⁵ stands for the least value.
@@ -409,8 +420,9 @@ pub(crate) fn gsf() -> Vec<u8> {
 
 /// A curve of AFM Workshop whose retract is shorter.
 pub(crate) fn workshop(point: usize) -> Vec<u8> {
+    let x = point as f64 - 5.5;
     format!(
-        "Force-Distance Curve\r\nFile Format:\t3\r\n\r\nPoint:\t{point}\r\nX, um:\t1.5\r\nY, um:\t2.5\r\nLight Lever Gain, mV/nm:\t20\r\n\
+        "Force-Distance Curve\r\nFile Format:\t3\r\n\r\nPoint:\t{point}\r\nX, um:\t{x}\r\nY, um:\t2.5\r\nLight Lever Gain, mV/nm:\t20\r\n\
          Force Constant, nN/nm:\t0.5\r\n\r\nExtend Z-Sense(nm),Extend T-B(V),Retract Z-Sense(nm),Retract T-B(V)\r\n\
          100,0.1,102,0.3\r\n101,0.2,101,0.2\r\n102,0.3,,\r\n"
     )

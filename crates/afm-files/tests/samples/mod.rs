@@ -1,15 +1,31 @@
 //! Small files of every format, written here: for the tests of the readers and for hostile changes.
 #![allow(dead_code, reason = "each test uses some of the writers")]
 
+use std::borrow::Cow;
+use std::io::Write;
+
 /// A zip archive; every second file is deflated.
 pub(crate) fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     let mut archive = Vec::new();
+    let files = files.iter().enumerate();
+    let files = files.map(|(k, (name, content))| (name.clone(), &content[..], k % 2 == 1));
+    zip_into(&mut archive, files).expect("memory");
+    archive
+}
+
+/// Writes a zip archive of files: name, content, and whether it is deflated.
+pub(crate) fn zip_into<'a>(
+    archive: &mut impl Write,
+    files: impl Iterator<Item = (String, &'a [u8], bool)>,
+) -> std::io::Result<()> {
     let mut directory = Vec::new();
-    for (k, (name, content)) in files.iter().enumerate() {
-        let (method, packed) = if k % 2 == 0 {
-            (0_u16, content.clone())
+    let (mut at, mut count) = (0_u32, 0_u16);
+    for (name, content, is_deflated) in files {
+        let (method, packed) = if is_deflated {
+            let packed = miniz_oxide::deflate::compress_to_vec(content, 6);
+            (8_u16, Cow::Owned(packed))
         } else {
-            (8, miniz_oxide::deflate::compress_to_vec(content, 6))
+            (0, Cow::Borrowed(content))
         };
         let mut shared = Vec::new();
         shared.extend([20, 0, 0, 0]);
@@ -20,27 +36,25 @@ pub(crate) fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
         shared.extend((content.len() as u32).to_le_bytes());
         shared.extend((name.len() as u16).to_le_bytes());
         shared.extend([0; 2]);
-        let at = archive.len() as u32;
-        archive.extend(b"PK\x03\x04");
-        archive.extend(&shared);
-        archive.extend(name.as_bytes());
-        archive.extend(packed);
+        archive.write_all(b"PK\x03\x04")?;
+        archive.write_all(&shared)?;
+        archive.write_all(name.as_bytes())?;
+        archive.write_all(&packed)?;
         directory.extend(b"PK\x01\x02\x14\0");
-        directory.extend(shared);
+        directory.extend(&shared);
         directory.extend([0; 10]);
         directory.extend(at.to_le_bytes());
         directory.extend(name.as_bytes());
+        at += 4 + (shared.len() + name.len() + packed.len()) as u32;
+        count += 1;
     }
-    let at = archive.len() as u32;
-    let count = (files.len() as u16).to_le_bytes();
-    archive.extend(&directory);
-    archive.extend(b"PK\x05\x06\0\0\0\0");
-    archive.extend(count);
-    archive.extend(count);
-    archive.extend((directory.len() as u32).to_le_bytes());
-    archive.extend(at.to_le_bytes());
-    archive.extend([0; 2]);
-    archive
+    archive.write_all(&directory)?;
+    archive.write_all(b"PK\x05\x06\0\0\0\0")?;
+    archive.write_all(&count.to_le_bytes())?;
+    archive.write_all(&count.to_le_bytes())?;
+    archive.write_all(&(directory.len() as u32).to_le_bytes())?;
+    archive.write_all(&at.to_le_bytes())?;
+    archive.write_all(&[0; 2])
 }
 
 const SHARED: &str = "\
@@ -554,4 +568,14 @@ pub(crate) fn archives() -> Vec<(&'static str, Files)> {
 pub(crate) fn hdf5() -> Vec<u8> {
     let packed = include_bytes!("afmformats.h5.zlib");
     miniz_oxide::inflate::decompress_to_vec_zlib(packed).expect("a zlib stream")
+}
+
+/// The largest memory of this process so far, in bytes, where the system tells it.
+#[expect(clippy::disallowed_methods, reason = "the system's own file ends")]
+pub(crate) fn largest_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(1024 * line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
 }

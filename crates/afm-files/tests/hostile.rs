@@ -41,7 +41,7 @@ fn exhaust(name: &str, bytes: Vec<u8>) {
     let begin = Instant::now();
     let limits = Limits::with_decoded_bytes(16 << 20);
     // Some from memory, some as from a disk.
-    let document = if bytes.len() % 2 == 0 {
+    let document = if bytes.len().is_multiple_of(2) {
         read_within(bytes, limits)
     } else {
         read_from(Cursor::new(bytes), limits)

@@ -138,6 +138,14 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
             "only those are read",
         ));
     }
+    if let Some(mut grid) = volume.grid.take() {
+        let number = |key: &str| volume.number(key);
+        let both = |keys: [&str; 2]| keys.map(|key| number(key).unwrap_or(0.0));
+        grid.size = both(["FastScanSize", "SlowScanSize"]);
+        grid.centre = both(["XOffset", "YOffset"]);
+        grid.angle = number("ScanAngle").unwrap_or(0.0).to_radians();
+        volume.grid = Some(grid);
+    }
     document.settings.clone_from(&volume.note);
     document.grid = volume.grid.filter(|_| !volume.curves.is_empty());
     document.curves = Box::new(Volume {
@@ -239,11 +247,9 @@ impl Volume {
         Ok(())
     }
 
-    fn setting(&self, key: &str) -> Option<f64> {
+    fn number(&self, key: &str) -> Option<f64> {
         let found = self.note.iter().find(|(name, _)| name == key);
-        found
-            .and_then(|(_, value)| crate::text::number(value))
-            .filter(|of| *of > 0.0)
+        found.and_then(|(_, value)| crate::text::number(value))
     }
 }
 
@@ -255,13 +261,16 @@ impl CurveSource for Volume {
     fn curve(&self, number: usize, limits: Limits) -> Result<Curve, Error> {
         let parts = &self.curves[number];
         let mut curve = Curve::empty(number);
-        curve.spring_constant = self.setting("SpringConstant");
-        curve.sensitivity = self.setting("InvOLS");
+        let above_zero = |key: &str| self.number(key).filter(|of| *of > 0.0);
+        curve.spring_constant = above_zero("SpringConstant");
+        curve.sensitivity = above_zero("InvOLS");
         at_most(parts.len(), MAX_CHANNELS, "channels in a curve")?;
         let Some(first) = parts.first() else {
             return Ok(curve);
         };
         curve.pixel = self.pixel(number, limits);
+        let grid = self.grid.filter(|of| of.size != [0.0; 2]);
+        curve.position = grid.and_then(|of| of.position(curve.pixel?));
         let mut cuts: Vec<usize> = first.numbers[5..]
             .iter()
             .copied()

@@ -29,18 +29,18 @@
 //! | JPK | `.jpk-force`, `.jpk-force-map`, `.jpk-qi-data`, `.jpk-qi-series` | curves with all segments (pauses and modulations too), k, InvOLS, positions, the grid, images inside |
 //! | JPK images | `.jpk`, `.jpk-qi-image` | images, trace and retrace |
 //! | JPK thermal noise | `.tnd` | spectra, settings |
-//! | Bruker Nanoscope | `.spm`, `.000`–`.999`, `.pfc` | curves, force volumes, images; k, InvOLS |
-//! | Nanosurf | `.nid` | curves and maps, images, thermal spectra; k, InvOLS |
+//! | Bruker Nanoscope | `.spm`, `.000`–`.999`, `.pfc` | curves, force volumes, positions, the grid, images; k, InvOLS |
+//! | Nanosurf | `.nid` | curves and maps, positions, the grid, images, thermal spectra; k, InvOLS |
 //! | Igor, of Asylum Research | `.ibw` | a curve with its segments, or images; k, InvOLS, the note |
 //! | Asylum Research | `.ardf` | curves and images; written without a real file at hand |
 //! | Gwyddion | `.gwy`, `.gsf` | images, metadata |
-//! | AFM Workshop | `.csv` | a curve; k and InvOLS where they are set |
+//! | AFM Workshop | `.csv` | a curve with its position; k and InvOLS where they are set |
 //! | NT-MDT Nova | text | a curve; deflection in A, no InvOLS |
 //! | Optics11 Chiaro | text | a curve, cut where the piezo turns; k |
 //! | HDF5 of afmformats | `.h5` | curves and maps, cut into segments; k, InvOLS, positions, the grid |
 //! | Universal force format | `.uff` | a curve; k, InvOLS |
 //! | WSxM | `.stp`, `.top` | an image |
-//! | zip | `.zip` | the content of all files in it |
+//! | zip | `.zip` | the content of all files in it; the grid of an AFM Workshop map, by its positions |
 //!
 //! Files that are recognised and refused with their name: other HDF5 files, such as the images of JPK
 //! (`.h5-jpk`), high-speed videos (`.asd`), Igor experiments (`.pxp`), and Igor waves of older versions
@@ -130,14 +130,15 @@ pub fn read_within(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
 /// As [`read`], and [`Error::Io`] if the file cannot be opened or read.
 ///
 /// ```no_run
-/// let map = afm_files::open("cells.jpk-qi-data".as_ref(), afm_files::Limits::default())?;
+/// let map = afm_files::open("cells.jpk-qi-data", afm_files::Limits::default())?;
 /// for number in 0..map.curve_count() {
 ///     let curve = map.curve(number)?;
 ///     println!("{:?} {:?}", curve.position, curve.segments.len());
 /// }
 /// # Ok::<(), afm_files::Error>(())
 /// ```
-pub fn open(path: &Path, limits: Limits) -> Result<Document, Error> {
+pub fn open(path: impl AsRef<Path>, limits: Limits) -> Result<Document, Error> {
+    let path = path.as_ref();
     #[expect(
         clippy::disallowed_methods,
         reason = "its length is known before it is read"

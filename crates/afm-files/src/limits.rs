@@ -8,7 +8,8 @@ use crate::Error;
 #[non_exhaustive]
 pub struct Limits {
     /// Bytes that one step decodes: opening a file (headers, images, spectra, the files in an archive)
-    /// or decoding one of its curves. Default: 256 MiB.
+    /// or decoding one of its curves. Default: 256 MiB. A file that [`open`](crate::open) cannot leave on
+    /// the disk may have as many bytes; maps may have more.
     pub decoded_bytes: u64,
 }
 

@@ -337,6 +337,7 @@ fn records_of_ardf_are_found_by_their_checksums() {
     assert_eq!(styles(&curve), [Style::Approach, Style::Retract]);
     assert_eq!(deflection(&curve, 0, 1.0), [1, 2]);
     assert_eq!((curve.spring_constant, curve.pixel), (Some(2.0), Some(1)));
+    assert_eq!(curve.position, Some([5e-7, 0.0]));
 }
 
 #[test]
@@ -417,7 +418,7 @@ fn a_file_on_the_disk_is_read_as_its_bytes() {
         let curves = of_device.curves().collect::<Result<Vec<_>, _>>();
         assert_eq!(curves, document.curves().collect(), "{name}");
     }
-    let folder = afm_files::open(".".as_ref(), Limits::default()).expect_err("a folder");
+    let folder = afm_files::open(".", Limits::default()).expect_err("a folder");
     assert!(folder.to_string().contains("`.`"), "{folder}");
 }
 

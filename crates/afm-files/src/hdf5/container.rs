@@ -15,7 +15,7 @@ const FORMAT: Format = Format::Hdf5;
 /// An address that stands for "nothing".
 const NOWHERE: u64 = u64::MAX;
 /// What a read costs at least, in bytes of the budget.
-const READ_COST: u64 = 256;
+const READ_COST: u64 = 1024;
 /// Blocks of one object header.
 const MAX_BLOCKS: usize = 1000;
 /// Filters of a dataset.

@@ -508,7 +508,10 @@ pub(crate) fn ardf() -> Vec<u8> {
     };
     let mut file = record("ARDF", &[]);
     file.extend([0; 8]);
-    file.extend(record("TEXT", b"SpringConstant: 2\rInvOLS: 1e-7\r"));
+    file.extend(record(
+        "TEXT",
+        b"SpringConstant: 2\rInvOLS: 1e-7\rFastScanSize: 2e-6\rSlowScanSize: 1e-6\r",
+    ));
     file.extend(record("IDEF", &[words(&[2, 1]), name("Height")].concat()));
     file.extend(record("IDAT", &floats(&[1.0, 2.0])));
     file.extend(record(

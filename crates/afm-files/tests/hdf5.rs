@@ -59,7 +59,7 @@ fn numbers_are_those_of_h5py() {
         return;
     }
     let expected = numbers(&begin.with_extension("json"));
-    let document = open(&begin.with_extension("h5"), Limits::default()).expect("a document");
+    let document = open(begin.with_extension("h5"), Limits::default()).expect("a document");
     assert_eq!(document.curve_count(), 30);
     let setting = document
         .settings

@@ -28,6 +28,7 @@
 //! |---|---|---|
 //! | JPK | `.jpk-force`, `.jpk-force-map`, `.jpk-qi-data`, `.jpk-qi-series` | curves with all segments (pauses and modulations too), k, InvOLS, positions, the grid, images inside |
 //! | JPK images | `.jpk`, `.jpk-qi-image` | images, trace and retrace |
+//! | HDF5 of JPK | `.h5-jpk` | images, each frame of a series |
 //! | JPK thermal noise | `.tnd` | spectra, settings |
 //! | Bruker Nanoscope | `.spm`, `.000`–`.999`, `.pfc` | curves, force volumes, positions, the grid, images; k, InvOLS |
 //! | Nanosurf | `.nid` | curves and maps, positions, the grid, images, thermal spectra; k, InvOLS |
@@ -42,9 +43,8 @@
 //! | WSxM | `.stp`, `.top` | an image |
 //! | zip | `.zip` | the content of all files in it; the grid of an AFM Workshop map, by its positions |
 //!
-//! Files that are recognised and refused with their name: other HDF5 files, such as the images of JPK
-//! (`.h5-jpk`), high-speed videos (`.asd`), Igor experiments (`.pxp`), and Igor waves of older versions
-//! or without named channels.
+//! Files that are recognised and refused with their name: other HDF5 files, high-speed videos (`.asd`),
+//! Igor experiments (`.pxp`), and Igor waves of older versions or without named channels.
 //!
 //! # Distance
 //!

@@ -37,6 +37,8 @@ pub(crate) const MAX_SEGMENTS: usize = 1000;
 pub(crate) const MAX_CURVES: usize = 1 << 18;
 /// Channels of a segment, images of a file.
 pub(crate) const MAX_CHANNELS: usize = 256;
+/// Frames of a series of images.
+pub(crate) const MAX_IMAGES: usize = 1 << 16;
 /// Bytes of a header.
 pub(crate) const MAX_HEADER: usize = 16 << 20;
 /// Bytes of a line of a header.

@@ -378,6 +378,19 @@ fn hdf5_of_afmformats_is_cut_into_segments_by_its_mode() {
 }
 
 #[test]
+fn hdf5_of_jpk_has_an_image_for_each_frame() {
+    let document = open(samples::hdf5_images());
+    let [first, second] = &document.images[..] else {
+        panic!("{} images", document.images.len());
+    };
+    assert_eq!(first.name, "height retrace, frame 0");
+    assert_eq!((first.shape, first.size), ([3, 2], Some([3e-6, 2e-6])));
+    assert_eq!(first.unit, "m");
+    assert_eq!(steps(&first.values, 1e-9), [13, 17, 21, 1, 5, 9]);
+    assert_eq!(steps(&second.values, 1e-9), [15, 19, 23, 3, 7, 11]);
+}
+
+#[test]
 fn files_in_an_archive_are_read_each_by_itself() {
     let files = [
         ("b.csv".to_owned(), samples::workshop(1)),

@@ -130,6 +130,11 @@ impl<'a> Reader<'a> {
         Self { source, budget }
     }
 
+    /// Counts decoded numbers before memory is taken for them.
+    pub(super) fn take_numbers(&mut self, count: usize) -> Result<(), Error> {
+        self.budget.numbers(count)
+    }
+
     fn bytes(&mut self, at: u64, length: u64) -> Result<Cow<'a, [u8]>, Error> {
         self.source.check(at, length, FORMAT)?;
         self.budget.take(length.saturating_add(READ_COST))?;
@@ -393,8 +398,17 @@ impl<'a> Reader<'a> {
         ))
     }
 
-    /// The numbers of a dataset.
+    /// The numbers of a dataset of one dimension.
     pub(super) fn numbers(&mut self, dataset: &Object) -> Result<Vec<f64>, Error> {
+        match self.table(dataset)? {
+            ([_, 1], numbers) => Ok(numbers),
+            _ => Err(newer("a table where a row of numbers is expected")),
+        }
+    }
+
+    /// The lengths and numbers of a dataset of two dimensions, row by row; the second has length 1 if there
+    /// is only one.
+    pub(super) fn table(&mut self, dataset: &Object) -> Result<([usize; 2], Vec<f64>), Error> {
         let (Some(space), Some(kind), Some(layout)) = (
             dataset.first(DATASPACE),
             dataset.first(DATATYPE),
@@ -406,12 +420,16 @@ impl<'a> Reader<'a> {
             return Err(newer("a dataset of other things than numbers"));
         };
         let lengths = dimensions(&space)?.unwrap_or_else(|| vec![0]);
-        if lengths.len() > 1 {
-            return Err(newer("a table where a row of numbers is expected"));
-        }
-        let count = lengths.first().copied().unwrap_or(1);
+        let shape = match *lengths {
+            [] => [1, 1],
+            [points] => [points, 1],
+            [rows, columns] => [rows, columns],
+            _ => return Err(newer("a dataset of more than two dimensions")),
+        };
+        let count = shape[0].saturating_mul(shape[1]);
         self.budget.take(count.saturating_mul(8))?;
-        let (count, size) = (count as usize, encoding.size());
+        let (shape, count) = (shape.map(|of| of as usize), count as usize);
+        let size = encoding.size();
         let [version, class] = [layout.slice(0, 2)?[0], layout.data[1]];
         if !matches!(version, 3 | 4) {
             return Err(newer(&format!("a layout of version {version}")));
@@ -428,13 +446,21 @@ impl<'a> Reader<'a> {
             2 if version == 3 => {
                 let filters = dataset.first(FILTERS);
                 let filters = filters.map_or(Ok(Vec::new()), |of| filters_of(&of))?;
-                self.chunks(&layout, &filters, encoding, count, &mut numbers)?;
+                numbers.resize(count, 0.0);
+                self.chunks(
+                    &layout,
+                    &filters,
+                    encoding,
+                    lengths.len(),
+                    shape,
+                    &mut numbers,
+                )?;
             }
             _ => return Err(newer("an index of chunks of a newer kind")),
         }
         // What was never written is 0.
         numbers.resize(count, 0.0);
-        Ok(numbers)
+        Ok((shape, numbers))
     }
 
     /// Reads the chunks of a dataset into its numbers.
@@ -443,29 +469,38 @@ impl<'a> Reader<'a> {
         layout: &Bytes,
         filters: &[Filter],
         encoding: Encoding,
-        count: usize,
-        numbers: &mut Vec<f64>,
+        rank: usize,
+        shape: [usize; 2],
+        numbers: &mut [f64],
     ) -> Result<(), Error> {
         let tree = layout.whole(3, 8, false)?;
-        let (dimensions, chunk) = (layout.slice(2, 1)?[0], layout.u32_le(11)?);
-        if dimensions != 2 || chunk == 0 || layout.u32_le(15)? != encoding.size() {
-            return Err(damaged(
-                tree,
-                "other chunks",
-                "a row of numbers of the stated size",
-            ));
+        let mut chunk = [1, 1];
+        for (k, length) in chunk.iter_mut().enumerate().take(rank) {
+            *length = layout.u32_le(11 + 4 * k)?;
+        }
+        let is_right = usize::from(layout.slice(2, 1)?[0]) == rank + 1
+            && layout.u32_le(11 + 4 * rank)? == encoding.size();
+        if !is_right || chunk.contains(&0) {
+            let expected = "the dimensions and the size of the numbers";
+            return Err(damaged(tree, "other chunks", expected));
         }
         if tree == NOWHERE {
             return Ok(());
         }
+        let most = shape[0]
+            .div_ceil(chunk[0])
+            .saturating_mul(shape[1].div_ceil(chunk[1]));
         let mut places = Vec::new();
-        // Size, filters that were left out, first number.
-        self.tree(tree, 1, 24, u8::MAX, &mut |entry, at| {
-            places.push((entry.u32_le(0)?, entry.u32_le(4)?, entry.u64_le(8)?, at));
-            at_most(places.len(), count.div_ceil(chunk), "chunks of a dataset")
+        // Size, filters that were left out, first number in each dimension.
+        self.tree(tree, 1, 16 + 8 * rank, u8::MAX, &mut |entry, at| {
+            let column = if rank == 2 { entry.u64_le(16)? } else { 0 };
+            let first = [entry.u64_le(8)?, column];
+            places.push((entry.u32_le(0)?, entry.u32_le(4)?, first, at));
+            at_most(places.len(), most, "chunks of a dataset")
         })?;
-        numbers.resize(count, 0.0);
-        let length = chunk.saturating_mul(encoding.size());
+        let length = chunk[0]
+            .saturating_mul(chunk[1])
+            .saturating_mul(encoding.size());
         for (size, left_out, first, at) in places {
             let raw = self.bytes(at, size as u64)?;
             self.budget.take(length as u64)?;
@@ -477,16 +512,19 @@ impl<'a> Reader<'a> {
                         .map_err(|of| damaged(at, of, "a whole chunk"))?;
                 }
             }
-            let part = numbers.get_mut(first..).unwrap_or_default();
-            if raw.len() != length || part.is_empty() {
-                return Err(damaged(
-                    at,
-                    "a chunk of another length",
-                    format!("{length} bytes"),
-                ));
+            if raw.len() != length || first[0] >= shape[0] || first[1] >= shape[1] {
+                let expected = format!("{length} bytes");
+                return Err(damaged(at, "a chunk of another length", expected));
             }
-            for (number, value) in part.iter_mut().zip(encoding.all(&raw)) {
-                *number = value;
+            // The last chunks reach beyond the dataset.
+            let columns = chunk[1].min(shape[1] - first[1]);
+            let rows = numbers.chunks_exact_mut(shape[1]).skip(first[0]);
+            let of_chunk = raw.chunks_exact(chunk[1] * encoding.size());
+            for (row, of_chunk) in rows.zip(of_chunk) {
+                let places = row[first[1]..first[1] + columns].iter_mut();
+                places
+                    .zip(encoding.all(of_chunk))
+                    .for_each(|(number, value)| *number = value);
             }
         }
         Ok(())

@@ -1,7 +1,8 @@
 //! HDF5 files of the Python package afmformats: a group for each curve with its settings as attributes,
-//! and a row of numbers for each channel.
+//! and a row of numbers for each channel. Images of JPK.
 
 mod container;
+mod images;
 
 use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, CurveSource, Document, Grid, Segment, Style};
@@ -91,10 +92,16 @@ pub(crate) fn read(source: Source, limits: Limits) -> Result<Document, Error> {
     let root = reader.root()?;
     let settings = Settings(reader.attributes(&root)?);
     let links = reader.links(&root)?;
+    let mut document = Document::new(Format::Hdf5, limits);
+    let kind = settings.text("file-format-info");
+    if let Some(kind) = kind.filter(|of| of.starts_with("JPK")) {
+        kind.clone_into(&mut document.kind);
+        images::read(&mut reader, &links, &mut document)?;
+        return Ok(document);
+    }
     if settings.text("software") != Some("afmformats") {
         return Err(other_program(&settings, &links));
     }
-    let mut document = Document::new(Format::Hdf5, limits);
     let mut groups: Vec<(usize, u64)> = Vec::new();
     for (name, at) in links {
         match name.parse() {
@@ -125,25 +132,15 @@ pub(crate) fn read(source: Source, limits: Limits) -> Result<Document, Error> {
 
 /// Says what an HDF5 file of another program is.
 fn other_program(settings: &Settings, links: &[(String, u64)]) -> Error {
-    let content = match (settings.text("software"), settings.text("file-format-info")) {
-        (_, Some(info)) if info.contains("JPK") => "an HDF5 image of JPK (.h5-jpk)".to_owned(),
+    let names = links.iter().take(4).map(|(of, _)| format!("`{of}`"));
+    let names: Vec<String> = names.collect();
+    let content = match (settings.text("software"), names.as_slice()) {
         (Some(software), _) => format!("an HDF5 file of `{software}`"),
-        _ => {
-            let names: Vec<String> = links
-                .iter()
-                .take(4)
-                .map(|(of, _)| format!("`{of}`"))
-                .collect();
-            match names.as_slice() {
-                [] => "an empty HDF5 file".to_owned(),
-                names => format!("an HDF5 file that holds {}", names.join(", ")),
-            }
-        }
+        (None, []) => "an empty HDF5 file".to_owned(),
+        (None, names) => format!("an HDF5 file that holds {}", names.join(", ")),
     };
-    Format::Hdf5.unsupported(
-        content,
-        "of HDF5, only curves that afmformats wrote are read",
-    )
+    let reason = "of HDF5, curves of afmformats and images of JPK are read";
+    Format::Hdf5.unsupported(content, reason)
 }
 
 impl CurveSource for Curves {

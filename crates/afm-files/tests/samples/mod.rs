@@ -535,6 +535,7 @@ pub(crate) fn ardf() -> Vec<u8> {
 pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("hdf5", hdf5()),
+        ("hdf5 images", hdf5_images()),
         ("jpk image", jpk_image()),
         ("nanosurf", nanosurf()),
         ("igor curve", igor_curve()),
@@ -569,7 +570,15 @@ pub(crate) fn archives() -> Vec<(&'static str, Files)> {
 /// A map of two curves that afmformats 0.18.7 and h5py 3.16 wrote, packed by zlib. The rows of the first
 /// are as afmformats stores them; those of the second in chunks, as a whole, and in the header.
 pub(crate) fn hdf5() -> Vec<u8> {
-    let packed = include_bytes!("afmformats.h5.zlib");
+    unpacked(include_bytes!("afmformats.h5.zlib"))
+}
+
+/// Two frames of 3 × 2 pixels in the layout of JPK, which h5py 3.16 wrote in chunks of 4 × 1.
+pub(crate) fn hdf5_images() -> Vec<u8> {
+    unpacked(include_bytes!("images.h5-jpk.zlib"))
+}
+
+fn unpacked(packed: &[u8]) -> Vec<u8> {
     miniz_oxide::inflate::decompress_to_vec_zlib(packed).expect("a zlib stream")
 }
 

@@ -184,7 +184,7 @@ fn read_source(source: Source, limits: Limits) -> Result<Document, Error> {
             if archive.find(jpk::HEADER).is_some() {
                 jpk::read(archive, limits)
             } else {
-                archive::read(&archive, limits)
+                archive::read(archive, limits)
             }
         }
         Format::JpkImage => jpk_image::read(&whole(source)?, limits),

@@ -1,5 +1,7 @@
 //! Texts of instruments: their encodings, numbers and units.
 
+use std::borrow::Cow;
+
 /// A text in Latin-1.
 pub(crate) fn latin1(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| char::from(*byte)).collect()
@@ -22,19 +24,21 @@ pub(crate) fn utf8_or_windows(bytes: &[u8]) -> String {
 }
 
 /// A text in UTF-8 with or without a byte order mark, in UTF-16 with one, or in Windows-1252.
-pub(crate) fn any(bytes: &[u8]) -> String {
+pub(crate) fn any(bytes: &[u8]) -> Cow<'_, str> {
     let utf16 = |of: &[u8], decode: fn([u8; 2]) -> u16| {
         let units = of.chunks_exact(2).map(|two| decode([two[0], two[1]]));
         char::decode_utf16(units)
             .map(|of| of.unwrap_or(char::REPLACEMENT_CHARACTER))
             .collect()
     };
-    match bytes {
-        [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_windows(rest),
-        [0xFF, 0xFE, rest @ ..] => utf16(rest, u16::from_le_bytes),
-        [0xFE, 0xFF, rest @ ..] => utf16(rest, u16::from_be_bytes),
-        _ => utf8_or_windows(bytes),
-    }
+    let bytes = match bytes {
+        [0xFF, 0xFE, rest @ ..] => return utf16(rest, u16::from_le_bytes),
+        [0xFE, 0xFF, rest @ ..] => return utf16(rest, u16::from_be_bytes),
+        [0xEF, 0xBB, 0xBF, rest @ ..] => rest,
+        _ => bytes,
+    };
+    let text = std::str::from_utf8(bytes);
+    text.map_or_else(|_| Cow::Owned(utf8_or_windows(bytes)), Cow::Borrowed)
 }
 
 /// A text up to its first zero, in Latin-1.

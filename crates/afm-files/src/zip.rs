@@ -67,12 +67,15 @@ fn damaged(at: u64, problem: &str, expected: &str) -> Error {
 impl Directory {
     /// Reads the directory of an archive.
     pub(crate) fn read(source: &(impl ReadAt + ?Sized)) -> Result<Self, Error> {
-        let (count, first) = end_record(source)?;
-        at_most(count, MAX_ENTRIES, "files in an archive")?;
+        let end = end_record(source)?;
         let mut directory = Self::default();
         let (mut part, mut part_at) = (Vec::new(), 0);
-        let mut at = first;
-        for _ in 0..count {
+        let mut count = 0;
+        let mut at = end.first;
+        let last = end.first.saturating_add(end.size);
+        while at < last {
+            count += 1;
+            at_most(count, MAX_ENTRIES, "files in an archive")?;
             // A part holds at least one whole record.
             let part_end = part_at + part.len() as u64;
             if at.saturating_add(MAX_RECORD) > part_end && part_end < source.length() {
@@ -82,7 +85,12 @@ impl Directory {
             }
             at += directory.record(&Bytes::new(&part, Format::Zip), part_at, at)?;
         }
-        directory.check(first)?;
+        // Programs without zip64 write the last 16 bits of the count.
+        if count as u64 & end.count_mask != end.count {
+            let problem = format!("{count} files where the archive states {}", end.count);
+            return Err(damaged(end.first, &problem, "the stated count"));
+        }
+        directory.check(end.first)?;
         Ok(directory)
     }
 
@@ -274,8 +282,17 @@ impl Archive {
     }
 }
 
-/// How many files the archive states, and where its directory begins.
-fn end_record(source: &(impl ReadAt + ?Sized)) -> Result<(usize, u64), Error> {
+/// What the end of an archive says of its directory.
+struct End {
+    /// How many files there are, in the bits of the mask.
+    count: u64,
+    count_mask: u64,
+    /// Where the directory begins, and its length.
+    first: u64,
+    size: u64,
+}
+
+fn end_record(source: &(impl ReadAt + ?Sized)) -> Result<End, Error> {
     let length = source.length();
     // The zip64 locator has 20 bytes before the last record.
     let first = length.saturating_sub(LONGEST_END + 20);
@@ -288,10 +305,14 @@ fn end_record(source: &(impl ReadAt + ?Sized)) -> Result<(usize, u64), Error> {
             let problem = "the archive ends without its directory";
             damaged(length, problem, "a whole file")
         })?;
-    let (count, at) = (bytes.u16_le(end + 10)?, bytes.whole(end + 16, 4, false)?);
     let locator = end.saturating_sub(20);
     if !tail[locator..].starts_with(b"PK\x06\x07") {
-        return Ok((count, at));
+        return Ok(End {
+            count: bytes.whole(end + 10, 2, false)?,
+            count_mask: 0xFFFF,
+            size: bytes.whole(end + 12, 4, false)?,
+            first: bytes.whole(end + 16, 4, false)?,
+        });
     }
     let wide = bytes.whole(locator + 8, 8, false)?;
     let record = source.read(wide, 56, Format::Zip)?;
@@ -299,7 +320,12 @@ fn end_record(source: &(impl ReadAt + ?Sized)) -> Result<(usize, u64), Error> {
         return Err(damaged(wide, "no zip64 record", "the end of the directory"));
     }
     let record = Bytes::new(&record, Format::Zip);
-    Ok((record.u64_le(32)?, record.whole(48, 8, false)?))
+    Ok(End {
+        count: record.whole(32, 8, false)?,
+        count_mask: u64::MAX,
+        size: record.whole(40, 8, false)?,
+        first: record.whole(48, 8, false)?,
+    })
 }
 
 /// Replaces numbers that do not fit in 32 bits by those of the zip64 field, in its order.

@@ -13,7 +13,8 @@ pub(crate) fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     archive
 }
 
-/// Writes a zip archive of files: name, content, and whether it is deflated.
+/// Writes a zip archive of files: name, content, and whether it is deflated. Without zip64: of more than
+/// 65,535 files the last 16 bits of the count are written, as older programs do.
 pub(crate) fn zip_into<'a>(
     archive: &mut impl Write,
     files: impl Iterator<Item = (String, &'a [u8], bool)>,
@@ -46,7 +47,7 @@ pub(crate) fn zip_into<'a>(
         directory.extend(at.to_le_bytes());
         directory.extend(name.as_bytes());
         at += 4 + (shared.len() + name.len() + packed.len()) as u32;
-        count += 1;
+        count = count.wrapping_add(1);
     }
     archive.write_all(&directory)?;
     archive.write_all(b"PK\x05\x06\0\0\0\0")?;

@@ -292,6 +292,7 @@ struct End {
     size: u64,
 }
 
+/// Finds the end of an archive, with zip64 where it has one.
 fn end_record(source: &(impl ReadAt + ?Sized)) -> Result<End, Error> {
     let length = source.length();
     // The zip64 locator has 20 bytes before the last record.

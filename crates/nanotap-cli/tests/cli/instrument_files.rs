@@ -49,7 +49,7 @@ fn a_folder_is_listed_with_all_its_folders() {
         files[2]["error"]
             .as_str()
             .unwrap()
-            .contains("HDF5 is not read"),
+            .contains("HDF5, byte 0: 96 bytes are needed here"),
         "{}",
         files[2]
     );

@@ -114,6 +114,16 @@ fn a_jpk_map_has_its_grid_positions_and_image() {
 }
 
 #[test]
+fn a_reflected_grid_is_reported() {
+    let mut files = samples::jpk_map();
+    assert!(open(samples::zip(&files)).notes.is_empty());
+    let line = b"spm-force-scan-map.position-pattern.grid.reflect=true\n";
+    files[0].1.extend(line);
+    let notes = open(samples::zip(&files)).notes;
+    assert!(notes[0].contains("the grid is reflected"), "{notes:?}");
+}
+
+#[test]
 fn a_jpk_image_is_scaled_and_its_lowest_line_is_the_last() {
     let document = open(samples::jpk_image());
     let image = &document.images[0];

@@ -64,6 +64,14 @@ pub(crate) fn read(archive: Archive, limits: Limits) -> Result<Document, Error> 
         .find_map(|key| top.get(*key));
     document.kind = kind.cloned().unwrap_or_default();
     document.grid = grid(&top)?;
+    let reflected = ".position-pattern.grid.reflect";
+    let mut found = top.iter().filter(|(key, _)| key.ends_with(reflected));
+    if found.any(|(_, value)| value == "true") {
+        document.notes.push(
+            "the grid is reflected, which its places do not show: take the positions of the curves"
+                .to_owned(),
+        );
+    }
     for name in IMAGES {
         let Some(file) = archive.find(name) else {
             continue;

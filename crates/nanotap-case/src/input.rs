@@ -11,7 +11,7 @@
 )]
 
 use std::fs::{self, File, FileType};
-use std::io::{self, Read as _};
+use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use nanotap_error::Error;
@@ -132,6 +132,28 @@ pub fn start(path: &Path, count: u64) -> Result<Vec<u8>, InputError> {
     head(path, count, Origin::File, None)
 }
 
+/// A file of any length that is read where it is needed.
+pub trait Seekable: Read + Seek + Send {}
+
+impl<T: Read + Seek + Send> Seekable for T {}
+
+/// Opens a file of any length; of a pipe at most `limit` bytes are read at once.
+///
+/// # Errors
+/// As [`read`], but only a pipe can be too long.
+pub fn open(path: &Path, limit: u64, origin: Origin) -> Result<Box<dyn Seekable>, InputError> {
+    let opened = checked(path, origin, None).and_then(|kind| {
+        if kind.is_file() {
+            return Ok(Some(File::open(path)?));
+        }
+        Ok(None)
+    });
+    match opened.map_err(failed(path))? {
+        Some(file) => Ok(Box::new(file)),
+        None => Ok(Box::new(Cursor::new(read(path, limit, origin)?))),
+    }
+}
+
 /// Reads at most `count` bytes of a file that states no more than `limit`.
 fn head(
     path: &Path,
@@ -140,23 +162,29 @@ fn head(
     limit: Option<u64>,
 ) -> Result<Vec<u8>, InputError> {
     let read = || -> Result<Vec<u8>, InputFault> {
-        // Looked at before it is opened: opening a pipe waits for its writer.
-        let metadata = fs::metadata(path)?;
-        if metadata.is_dir() {
-            return Err(InputFault::Folder);
-        }
-        let is_pipe = origin == Origin::User && is_pipe(metadata.file_type());
-        if !metadata.is_file() && !is_pipe {
-            return Err(InputFault::NotRegular);
-        }
-        if let Some(limit) = limit.filter(|limit| metadata.len() > *limit) {
-            return Err(InputFault::TooLong(limit));
-        }
+        checked(path, origin, limit)?;
         let mut bytes = Vec::new();
         File::open(path)?.take(count).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
     read().map_err(failed(path))
+}
+
+/// The kind of a file that may be read. It is looked at before it is opened: opening a pipe waits for
+/// its writer.
+fn checked(path: &Path, origin: Origin, limit: Option<u64>) -> Result<FileType, InputFault> {
+    let metadata = fs::metadata(path)?;
+    if metadata.is_dir() {
+        return Err(InputFault::Folder);
+    }
+    let is_pipe = origin == Origin::User && is_pipe(metadata.file_type());
+    if !metadata.is_file() && !is_pipe {
+        return Err(InputFault::NotRegular);
+    }
+    match limit.filter(|limit| metadata.len() > *limit) {
+        Some(limit) => Err(InputFault::TooLong(limit)),
+        None => Ok(metadata.file_type()),
+    }
 }
 
 fn failed(path: &Path) -> impl FnOnce(InputFault) -> InputError {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afm_files::{Curve, Document, Image, Limits, Spectrum, Style, recognise};
+use afm_files::{Curve, Document, Image, Limits, Spectrum, Style};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -136,20 +136,17 @@ pub fn list(paths: &[PathBuf]) -> Result<FileList, Error> {
     let mut listed = FileList::default();
     for path in paths {
         if !path.is_dir() {
-            let bytes = input::read(path, MAX_TABLE_BYTES, Origin::User)?;
-            listed.files.push(FileContents::of(path, bytes));
+            let document = opened(path, Origin::User)?;
+            listed.files.push(FileContents::of(path, document));
             continue;
         }
         let mut files = Vec::new();
         walk(path, 0, &mut files)?;
         files.sort();
         for path in files {
-            let bytes = input::read(&path, MAX_TABLE_BYTES, Origin::File);
-            match bytes {
-                Ok(bytes) if recognise(&bytes).is_some() => {
-                    listed.files.push(FileContents::of(&path, bytes));
-                }
-                _ => listed.others += 1,
+            match opened(&path, Origin::File) {
+                Err(_) | Ok(Err(afm_files::Error::Unknown { .. })) => listed.others += 1,
+                Ok(document) => listed.files.push(FileContents::of(&path, document)),
             }
         }
     }
@@ -185,14 +182,14 @@ fn walk(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), Err
 /// # Errors
 /// If the file cannot be read or has no such item.
 pub fn item(path: &Path, which: Which) -> Result<Item, Error> {
-    let bytes = input::read(path, MAX_TABLE_BYTES, Origin::User)?;
+    let document = opened(path, Origin::User)?;
     let refuse = |message: String| {
         Error::input(
             format!("{}: {message}", path.display()),
             "`nanotap files` lists what a file holds",
         )
     };
-    let document = opened(bytes).map_err(refuse)?;
+    let document = document.map_err(|error| refuse(error.to_string()))?;
     let counts = [
         document.curve_count(),
         document.images.len(),
@@ -226,24 +223,30 @@ pub fn item(path: &Path, which: Which) -> Result<Item, Error> {
     }
 }
 
-fn opened(bytes: Vec<u8>) -> Result<Document, String> {
-    afm_files::read_within(bytes, Limits::default()).map_err(|error| error.to_string())
+/// The document of a file that can be read.
+fn opened(path: &Path, origin: Origin) -> Result<Result<Document, afm_files::Error>, Error> {
+    let file = input::open(path, MAX_TABLE_BYTES, origin)?;
+    Ok(afm_files::read_from(file, Limits::default()))
 }
 
 impl FileContents {
-    fn of(path: &Path, bytes: Vec<u8>) -> Self {
+    fn of(path: &Path, document: Result<Document, afm_files::Error>) -> Self {
+        use afm_files::Error::{Damaged, Unsupported};
         let mut contents = Self {
             path: path.display().to_string(),
-            format: recognise(&bytes).map(|of| name(&of)),
             ..Self::default()
         };
-        let document = match opened(bytes) {
+        let document = match document {
             Ok(document) => document,
             Err(error) => {
-                contents.error = Some(error);
+                if let Unsupported { format, .. } | Damaged { format, .. } = &error {
+                    contents.format = Some(name(format));
+                }
+                contents.error = Some(error.to_string());
                 return contents;
             }
         };
+        contents.format = Some(name(&document.format));
         contents.kind.clone_from(&document.kind);
         contents.curve_count = document.curve_count();
         contents.grid = document.grid.map(|of| of.shape);

@@ -334,7 +334,9 @@ impl Attractors {
         };
         // What an instrument shows, where there is one.
         let shown = match units {
-            Units::Si(_) => "attractor,motion,fraction,interval,exponent,A,phase,E_dis,F_max,contact",
+            Units::Si(_) => {
+                "attractor,motion,fraction,interval,exponent,A,phase,E_dis,F_max,contact"
+            }
             Units::Model => {
                 "attractor,motion,fraction,interval,exponent,tip,contact_fraction,contacts_per_period"
             }

@@ -21,17 +21,16 @@ pub(crate) fn cases(page: &str) -> impl Iterator<Item = (&str, &str)> {
     })
 }
 
-/// Commands of `nanotap` with the lines that the page shows below each.
-fn examples(text: &str) -> Vec<(&str, Vec<&str>)> {
+/// Commands of `nanotap` whose output a page shows, with the lines that it shows below each.
+pub(crate) fn examples(text: &str) -> Vec<(&str, Vec<&str>)> {
     let blocks = text.split("```console\n").skip(1);
     let blocks = blocks.map(|block| block.split("```").next().unwrap());
-    let with_output = blocks.filter_map(|block| block.strip_prefix("$ nanotap "));
-    with_output
-        .map(|block| {
-            let (command, shown) = block.split_once('\n').unwrap();
-            (command, shown.lines().collect())
-        })
-        .collect()
+    let commands = blocks.flat_map(|block| block.split("$ nanotap ").skip(1));
+    let all = commands.map(|block| {
+        let (command, shown) = block.split_once('\n').unwrap();
+        (command, shown.lines().collect::<Vec<_>>())
+    });
+    all.filter(|(_, shown)| !shown.is_empty()).collect()
 }
 
 /// Whether `printed` consists of the lines `shown`, `…` standing for any number of lines.
@@ -41,6 +40,24 @@ fn agrees(shown: &[&str], printed: &[&str]) -> bool {
         Some((&"…", rest)) => (0..=printed.len()).any(|k| agrees(rest, &printed[k..])),
         Some((line, rest)) => printed.first() == Some(line) && agrees(rest, &printed[1..]),
     }
+}
+
+/// Runs a command in `folder` and compares what it prints with the lines that a page shows.
+pub(crate) fn prints(folder: &Folder, command: &str, shown: &[&str]) {
+    let arguments = words(command);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = folder.run(&arguments);
+    assert_eq!(outcome.code, 0, "{command}: {}", outcome.stderr);
+    // Progress depends on time; notes and warnings do not.
+    let remarks = outcome.stderr.lines();
+    let remarks = remarks.filter(|l| l.starts_with("note: ") || l.starts_with("warning: "));
+    let printed: Vec<&str> = remarks.chain(outcome.stdout.lines()).collect();
+    assert!(
+        shown.len() > 3 && agrees(shown, &printed),
+        "{command}: the page shows\n{}\nbut the program prints\n{}",
+        shown.join("\n"),
+        printed.join("\n")
+    );
 }
 
 #[test]
@@ -53,19 +70,6 @@ fn the_readme_shows_what_the_program_prints() {
     let examples = examples(&text);
     assert_eq!(examples.len(), 3);
     for (command, shown) in examples {
-        let arguments = words(command);
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        let outcome = folder.run(&arguments);
-        assert_eq!(outcome.code, 0, "{command}: {}", outcome.stderr);
-        // Progress depends on time; notes and warnings do not.
-        let remarks = outcome.stderr.lines();
-        let remarks = remarks.filter(|l| l.starts_with("note: ") || l.starts_with("warning: "));
-        let printed: Vec<&str> = remarks.chain(outcome.stdout.lines()).collect();
-        assert!(
-            shown.len() > 5 && agrees(&shown, &printed),
-            "{command}: the README shows\n{}\nbut the program prints\n{}",
-            shown.join("\n"),
-            printed.join("\n")
-        );
+        prints(&folder, command, &shown);
     }
 }

@@ -5,7 +5,7 @@
 //! A `console` block contains commands, one per line that begins with `$ nanotap`. The following
 //! table contains values of the JSON document of the last command: a JSON pointer, the value, and
 //! its tolerance, relative (`1 %`) or absolute (`0.5`); `exactly` compares texts, whole numbers, true
-//! and false.
+//! and false. Lines below a command in its block are what it prints, as in the README.
 
 use std::path::{Path, PathBuf};
 
@@ -90,6 +90,9 @@ fn follow(name: &str) -> (usize, usize) {
     let (mut commands, mut numbers) = (0, 0);
     let mut said = Value::Null;
     let mut last = String::new();
+    for (command, shown) in crate::front_page::examples(&text) {
+        crate::front_page::prints(&folder, command, &shown);
+    }
     for line in text.lines() {
         if let Some(command) = line.strip_prefix("$ nanotap ") {
             let mut arguments = words(command);

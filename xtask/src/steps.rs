@@ -98,6 +98,12 @@ pub(crate) static OTHER_TASKS: &[Step] = &[
         run: |workspace, _| signatures(workspace, &[]),
     },
     Step {
+        name: "reference",
+        about: "write the pages of docs/reference from the program's tables",
+        takes_options: false,
+        run: |workspace, _| reference(workspace),
+    },
+    Step {
         name: "bench",
         about: "run every bench and write docs/benches.md",
         takes_options: false,
@@ -183,6 +189,13 @@ fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> 
         .arg("crates/nanotap-python/signatures.py")
         .arg(workspace.target().join("release").join("nanotap"))
         .args(further);
+    check(&workspace.root, &mut command)
+}
+
+/// Writes the pages of the reference from the program's tables.
+fn reference(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = workspace.cargo(&["run", "--release", "--package", "nanotap-book", "--"]);
+    command.arg(&workspace.root).arg("--reference");
     check(&workspace.root, &mut command)
 }
 

@@ -23,6 +23,11 @@ const AT_ROOT: &[&str] = &[
     "CHANGELOG.md",
 ];
 
+/// The page on the paper's statements in the table of contents, and what stands before it: it is made
+/// with the site, from a report that takes minutes.
+const STATEMENTS: &str = "  - [Every statement of the paper](reference/paper.md)\n";
+const BEFORE_STATEMENTS: &str = "](paper.md)\n";
+
 /// Folder of the pictures of the report on the paper.
 const PICTURES: &str = "docs/reference/paper/";
 
@@ -39,6 +44,26 @@ impl fmt::Display for Trouble {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}: {}", self.page, self.reason)
     }
+}
+
+/// Compares the pages of the reference in the repository at `root` with the program's tables; returns
+/// those that differ. With `write` they are written anew.
+///
+/// # Errors
+/// If a page cannot be written.
+pub fn outdated_reference(root: &Path, write: bool) -> Result<Vec<String>, Trouble> {
+    let mut outdated = Vec::new();
+    for (name, page) in reference::committed() {
+        let name = format!("docs/reference/{name}");
+        if fs::read_to_string(root.join(&name)).is_ok_and(|there| there == page) {
+            continue;
+        }
+        if write {
+            put(root, &name, page.as_bytes())?;
+        }
+        outdated.push(name);
+    }
+    Ok(outdated)
 }
 
 /// All pages of the book, with their table of contents.
@@ -60,7 +85,15 @@ impl Site {
         let mut names: Vec<String> = AT_ROOT.iter().map(|&name| name.to_owned()).collect();
         find_pages(root, "docs", &mut names)?;
         for name in names {
-            pages.insert(name.clone(), Page::read(text(root, &name)?));
+            let mut page = text(root, &name)?;
+            if name == "docs/SUMMARY.md" {
+                page = page.replacen(
+                    BEFORE_STATEMENTS,
+                    &format!("{BEFORE_STATEMENTS}{STATEMENTS}"),
+                    1,
+                );
+            }
+            pages.insert(name, Page::read(page));
         }
         let summary = pages.remove("docs/SUMMARY.md").ok_or_else(|| Trouble {
             page: "docs/SUMMARY.md".into(),

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use nanotap::control::Control;
-use nanotap_book::Site;
+use nanotap_book::{Site, outdated_reference};
 use nanotap_paper::{Options, report};
 
 #[test]
@@ -23,6 +23,17 @@ fn nothing_is_wrong_with_the_documents() {
     let lines: Vec<String> = troubles.iter().map(ToString::to_string).collect();
     assert!(troubles.is_empty(), "{}", lines.join("\n"));
     assert!(site.len() > 30, "only {} pages were found", site.len());
+}
+
+#[test]
+fn the_reference_says_what_the_program_s_tables_say() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let outdated = outdated_reference(&root, false).unwrap();
+    assert!(
+        outdated.is_empty(),
+        "run `cargo xtask reference` for {}",
+        outdated.join(", ")
+    );
 }
 
 #[test]

@@ -13,12 +13,19 @@ use nanotap_paper::Report;
 
 /// Every page: its name in `docs/reference/` and its Markdown.
 pub(crate) fn pages(report: &Report) -> Vec<(String, String)> {
+    let mut pages = committed();
+    pages.push(("paper.md".to_owned(), paper::page(report)));
+    pages
+}
+
+/// The pages that follow from the program's tables alone, which lie in the repository: its hosts show
+/// them.
+pub(crate) fn committed() -> Vec<(String, String)> {
     let mut pages = vec![
         ("case.md".to_owned(), case::page()),
         ("observables.md".to_owned(), observables::page()),
         ("laws.md".to_owned(), laws::page()),
         ("catalogue.md".to_owned(), catalogue::page()),
-        ("paper.md".to_owned(), paper::page(report)),
     ];
     for entry in STUDIES {
         pages.push((format!("{}.md", entry.name), study::page(entry)));

@@ -2,22 +2,17 @@
 
 use std::collections::HashMap;
 
+use nanotap::case::physical::Kind;
+use nanotap::case::units::prefixed;
 use nanotap::figure::approach::ApproachCurves;
 use nanotap::figure::basin::BasinTable;
 use nanotap::figure::branch::BranchCurves;
-use nanotap::figure::convergence::difference_panel;
-use nanotap::figure::fit::fit_figure;
-use nanotap::figure::modes::shapes_figure;
-use nanotap::figure::panels::{AttractorCurves, MotionCurves, OrbitCurves, SectionCurves};
-use nanotap::figure::reconstruct::reconstruct_figure;
+use nanotap::figure::panels::MotionCurves;
+use nanotap::figure::scan::scan_figure;
 use nanotap::figure::sweep::SweepTable;
-use nanotap::model::beam::Modes;
-use nanotap::study::fit::FitReport;
-use nanotap::study::reconstruct::ReconstructReport;
-use nanotap_figures::Figure;
+use nanotap::study::scan::ScanReport;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
@@ -26,6 +21,13 @@ use crate::failure::Failure;
 #[pyfunction]
 pub(crate) fn mathtext(label: &str) -> String {
     nanotap_figures::mathtext(label)
+}
+
+/// What multiplies numbers up to `size` in an SI unit where they are shown, and the unit with the prefix
+/// that fits; 1 and nothing for another unit.
+#[pyfunction]
+pub(crate) fn axis(unit: &str, size: f64) -> (f64, String) {
+    Kind::of_si_unit(unit).map_or((1.0, String::new()), |kind| prefixed(kind, 1.0, size))
 }
 
 /// Colours: of lines in their order, of the periods 1 to 16, and of the other classes of motions.
@@ -48,19 +50,6 @@ pub(crate) fn colours() -> (Vec<String>, Vec<String>, HashMap<String, String>) {
             .map(|class| (class.to_string(), class.colour().to_string()))
             .collect(),
     )
-}
-
-#[derive(Deserialize)]
-struct Differences {
-    modes: Vec<usize>,
-    difference: Vec<Option<f64>>,
-    tolerance: f64,
-    enough: Option<usize>,
-}
-
-#[derive(Deserialize)]
-struct Shapes {
-    modes: usize,
 }
 
 /// The description of the figure of a study, as JSON with its large columns apart.
@@ -98,27 +87,8 @@ pub(crate) fn describe(
             }
             "branch" => Some(read::<BranchCurves>(facts)?.figure()),
             "approach" => Some(read::<ApproachCurves>(facts)?.figure()),
-            "fit" => Some(fit_figure(&read::<FitReport>(facts)?)),
-            "reconstruct" => Some(reconstruct_figure(&read::<ReconstructReport>(facts)?)),
             "motion" => Some(read::<MotionCurves>(facts)?.figure()),
-            "orbit" => Some(read::<OrbitCurves>(facts)?.figure()),
-            "attractors" => Some(read::<AttractorCurves>(facts)?.figure()),
-            "section" => Some(read::<SectionCurves>(facts)?.figure()),
-            "convergence" => {
-                let Differences {
-                    modes,
-                    difference,
-                    tolerance,
-                    enough,
-                } = read(facts)?;
-                let panel = difference_panel(&modes, &difference, tolerance, enough);
-                Some(Figure::single(panel))
-            }
-            "modes" => {
-                let Shapes { modes } = read(facts)?;
-                let beam = Modes::new(modes).map_err(|error| Failure::input(error.to_string()))?;
-                Some(shapes_figure(&beam))
-            }
+            "scan" => Some(scan_figure(&read::<ScanReport>(facts)?)),
             _ => None,
         };
         let figure = figure

@@ -34,6 +34,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<case::CaseCore>()?;
     module.add_class::<map::MapCore>()?;
     module.add_class::<map::MotionCore>()?;
+    module.add_class::<study::ReportCore>()?;
     module.add_class::<dataset::Recipe>()?;
     module.add_class::<dataset::Receiver>()?;
     for function in [
@@ -49,6 +50,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(motion::series, module)?,
         wrap_pyfunction!(motion::observe, module)?,
         wrap_pyfunction!(motion::glossary, module)?,
+        wrap_pyfunction!(motion::labels, module)?,
         wrap_pyfunction!(study::study, module)?,
         wrap_pyfunction!(study::studies, module)?,
         wrap_pyfunction!(study::report_schema, module)?,
@@ -62,6 +64,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(dataset::window, module)?,
         wrap_pyfunction!(dataset::figure, module)?,
         wrap_pyfunction!(figure::mathtext, module)?,
+        wrap_pyfunction!(figure::axis, module)?,
         wrap_pyfunction!(figure::colours, module)?,
         wrap_pyfunction!(figure::describe, module)?,
         wrap_pyfunction!(dataset::gsf, module)?,

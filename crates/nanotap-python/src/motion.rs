@@ -1,31 +1,41 @@
 //! Single motions: modes, runs, orbits, and observables of many cases at once.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
+use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::control::Control;
+use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure};
+use nanotap::frame::{Form, Frame, Rows as FrameRows};
 use nanotap::map::MAX_NUMBERS;
-use nanotap::model::Model;
 use nanotap::model::beam::Modes;
+use nanotap::model::{Model, MotionError};
 use nanotap::observe::time_series::{self, state_names};
-use nanotap::study::modes::{ModesOptions, ModesStudy};
-use nanotap::study::orbit::{OrbitOptions, OrbitStudy};
-use nanotap::study::registry::{Document, Study as _};
+use nanotap::observe::{Dimension, OBSERVABLES};
+use nanotap::study::in_si::InSi;
+use nanotap::study::modes::{ModesOptions, ModesStudy, shape_table};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
+use nanotap::study::registry::{Answer, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::setpoint::at_setpoint;
 use nanotap::study::simulate::{SimulateOptions, SimulateReport, SimulateStudy};
 use nanotap::study::threads::install;
 use nanotap::{Error, ErrorKind};
+use nanotap_figures::Figure;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::case::CaseCore;
 use crate::columns::{Column, Entries, columns, entries};
 use crate::document::{document, python};
 use crate::failure::Failure;
-use crate::study::json;
+use crate::study::{Kept, ReportCore, json};
 use crate::watch::{watched, watched_alone};
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -38,18 +48,44 @@ fn table(py: Python<'_>, names: Vec<String>, values: Vec<f64>) -> PyResult<Table
     Ok((names, PyArray1::from_vec(py, values).reshape(shape)?))
 }
 
-/// Frequencies (JSON), positions along the beam, and the mode shapes there.
+/// Frequencies and mode shapes of a case: first the shapes at points along the beam.
+struct ModesAnswer {
+    kept: Kept<ModesStudy>,
+    beam: Modes,
+    points: usize,
+}
+
+impl Answer for ModesAnswer {
+    fn document(&self) -> Result<String, Error> {
+        self.kept.document()
+    }
+
+    fn frames(&self) -> Vec<Frame<'_>> {
+        let mut tables = self.kept.frames();
+        for (table, name) in tables.iter_mut().zip(["free", "contact"]) {
+            table.name = name;
+        }
+        tables.insert(0, shape_table(&self.beam, self.points));
+        tables
+    }
+
+    fn figure(&self) -> Option<Figure> {
+        self.kept.figure()
+    }
+}
+
+/// Frequencies, positions along the beam, and the mode shapes there.
 #[pyfunction]
 pub(crate) fn modes<'py>(
     py: Python<'py>,
     case: &CaseCore,
     request: &str,
-) -> PyResult<(String, Row<'py>, Rows<'py>)> {
-    let studied = case.studied(py)?;
+) -> PyResult<(ReportCore, Row<'py>, Rows<'py>)> {
+    let case = case.studied(py)?;
     let request: ModesOptions = read(json(request)?).map_err(Failure::from)?;
-    let table = ModesStudy::run(&studied, &request, &Control::default()).map_err(Failure::from)?;
-    let beam = Modes::new(table.modes).map_err(|error| Failure::input(error.to_string()))?;
-    let points = request.points;
+    let report = ModesStudy::run(&case, &request, &Control::default()).map_err(Failure::from)?;
+    let beam = Modes::new(report.modes).map_err(|error| Failure::input(error.to_string()))?;
+    let (points, width) = (request.points, report.modes);
     let xi: Vec<f64> = (0..points)
         .map(|point| point as f64 / (points - 1) as f64)
         .collect();
@@ -57,10 +93,10 @@ pub(crate) fn modes<'py>(
         .iter()
         .flat_map(|&xi| beam.shapes(xi).as_slice().to_vec())
         .collect();
-    let document =
-        serde_json::to_string(&Document::new(&table, &studied)).map_err(Failure::from)?;
-    let shapes = PyArray1::from_vec(py, shapes).reshape([points, table.modes])?;
-    Ok((document, PyArray1::from_vec(py, xi), shapes))
+    let shapes = PyArray1::from_vec(py, shapes).reshape([points, width])?;
+    let kept = Kept { case, report };
+    let answer = ModesAnswer { kept, beam, points };
+    Ok((ReportCore::new(answer), PyArray1::from_vec(py, xi), shapes))
 }
 
 fn rows(
@@ -87,21 +123,130 @@ fn rows(
     Ok(values)
 }
 
-/// A run: its document, and `series_periods` of its time series or, for fixed steps, its curve.
+/// A report on one motion.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum MotionReport {
+    Run(SimulateReport),
+    Orbit(InSi<OrbitReport>),
+}
+
+/// A motion of a case, with its time series of so many samples a period as the first table.
+struct MotionAnswer {
+    case: Arc<Case>,
+    report: MotionReport,
+    resolution: usize,
+}
+
+impl MotionAnswer {
+    fn series(&self, model: &Model) -> Result<Vec<Vec<f64>>, MotionError> {
+        let (start, periods) = match &self.report {
+            MotionReport::Run(SimulateReport::FixedStep(run)) => {
+                return Ok(run.curve.iter().map(|point| point.to_vec()).collect());
+            }
+            MotionReport::Run(SimulateReport::Exact(run)) => {
+                (&run.motion.start, run.motion.periods)
+            }
+            MotionReport::Orbit(orbit) => (&orbit.motion.state, orbit.motion.period),
+        };
+        let mut rows = Vec::new();
+        time_series::sample(model, start, periods, self.resolution, |row| {
+            rows.push(row.to_vec());
+        })?;
+        Ok(rows)
+    }
+}
+
+impl Answer for MotionAnswer {
+    fn document(&self) -> Result<String, Error> {
+        Ok(serde_json::to_string(&Document::new(
+            &self.report,
+            &self.case,
+        ))?)
+    }
+
+    fn frames(&self) -> Vec<Frame<'_>> {
+        let series = self.case.model().ok().and_then(|model| {
+            let rows = self.series(&model).ok()?;
+            Some(series_table(&model, rows, self.case.units()))
+        });
+        let harmonics = match &self.report {
+            MotionReport::Orbit(orbit) => OrbitStudy::frames(&self.case, orbit),
+            MotionReport::Run(_) => Vec::new(),
+        };
+        series.into_iter().chain(harmonics).collect()
+    }
+
+    fn figure(&self) -> Option<Figure> {
+        let (model, units) = (self.case.model().ok()?, self.case.units());
+        Some(match &self.report {
+            MotionReport::Run(SimulateReport::Exact(run)) => {
+                simulation_figure(&model, &run.motion, &units)
+            }
+            MotionReport::Run(SimulateReport::FixedStep(run)) => {
+                fixed_step_figure(&model, run, &units)
+            }
+            MotionReport::Orbit(orbit) => orbit_figure(&model, &orbit.motion, &units),
+        })
+    }
+}
+
+/// A time series in the model's units as a table, shown in `units`, with the columns of
+/// [`time_series::sample`] or the first of them; states stay in the model's units.
+fn series_table(model: &Model, rows: Vec<Vec<f64>>, units: Units) -> Frame<'static> {
+    const DIMENSIONS: [Dimension; 6] = [
+        Dimension::Time,
+        Dimension::Length,
+        Dimension::Velocity,
+        Dimension::Length,
+        Dimension::Force,
+        Dimension::Number,
+    ];
+    let words = nanotap::observe::glossary::glossary().model;
+    let width = rows.first().map_or(0, Vec::len);
+    let (count, rows) = (rows.len(), Rc::new(rows));
+    let mut table = FrameRows::new("series", 0..count, Some(units));
+    for (k, name) in time_series::columns(model)
+        .into_iter()
+        .enumerate()
+        .take(width)
+    {
+        let dimension = DIMENSIONS.get(k).copied();
+        let dimension = dimension.unwrap_or_else(|| match units.of_entry(&name) {
+            Some((Kind::Length, _)) => Dimension::Unit("g0"),
+            Some(_) => Dimension::Unit("g0/T"),
+            None => Dimension::Number,
+        });
+        let label = words
+            .get(&name)
+            .map_or("entry of the state", |entry| entry.words);
+        let rows = Rc::clone(&rows);
+        let cell = move |row: usize| rows[row][k];
+        table = table.column(name, "", (dimension, Form::Digits(5)), cell);
+        table = table.label(label);
+        if k == 0 {
+            table = table.si_name("time");
+        }
+    }
+    table.frame()
+}
+
+/// A run: its document and its report, and `series_periods` of its time series or, for fixed steps,
+/// its curve.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
     py: Python<'py>,
     case: &CaseCore,
     request: &str,
     series_periods: usize,
-) -> PyResult<(Bound<'py, PyAny>, Table<'py>)> {
-    let studied = case.studied(py)?;
+) -> PyResult<(Bound<'py, PyAny>, ReportCore, Table<'py>)> {
+    let case = case.studied(py)?;
     let request: SimulateOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched_alone(py, None, move |control| {
-        let report = SimulateStudy::run(&studied, &request, control)?;
+        let report = SimulateStudy::run(&case, &request, control)?;
         let (names, values) = match &report {
             SimulateReport::Exact(run) => {
-                let model = studied.cancelled_by(control).model()?;
+                let model = case.cancelled_by(control).model()?;
                 let start = &run.motion.start;
                 let values = rows(&model, start, series_periods, request.resolution)?;
                 (time_series::columns(&model), values)
@@ -111,33 +256,51 @@ pub(crate) fn simulate<'py>(
                 (names, run.curve.concat())
             }
         };
-        Ok((document(&report)?, names, values))
+        let (document, report) = (document(&report)?, MotionReport::Run(report));
+        let resolution = request.resolution;
+        let answer = MotionAnswer {
+            case,
+            report,
+            resolution,
+        };
+        Ok((document, answer, names, values))
     })?;
-    let (report, names, values) = done.result;
-    Ok((python(py, &report)?, table(py, names, values)?))
+    let (report, answer, names, values) = done.result;
+    let series = table(py, names, values)?;
+    Ok((python(py, &report)?, ReportCore::new(answer), series))
 }
 
-/// The document of a periodic orbit.
+/// A periodic orbit: its document and its report.
 #[pyfunction]
 pub(crate) fn orbit<'py>(
     py: Python<'py>,
     case: &CaseCore,
     request: &str,
-) -> PyResult<Bound<'py, PyAny>> {
-    let studied = case.studied(py)?;
+) -> PyResult<(Bound<'py, PyAny>, ReportCore)> {
+    let case = case.studied(py)?;
     let request: OrbitOptions = read(json(request)?).map_err(Failure::from)?;
     // An orbit of a given period may have to be searched for from starts all over.
     let searched = request.period.is_some() && request.state.is_none();
     let work = move |control: &Control<'_>| {
-        let found = OrbitStudy::run(&studied, &request, control)?;
-        document(&found)
+        let found = OrbitStudy::run(&case, &request, control)?;
+        let (document, report) = (document(&found)?, MotionReport::Orbit(found));
+        let resolution = request.resolution;
+        Ok((
+            document,
+            MotionAnswer {
+                case,
+                report,
+                resolution,
+            },
+        ))
     };
     let done = if searched {
         watched(py, None, work)?
     } else {
         watched_alone(py, None, work)?
     };
-    python(py, &done.result)
+    let (document, answer) = done.result;
+    Ok((python(py, &document)?, ReportCore::new(answer)))
 }
 
 /// The time series of so many periods from a state.
@@ -296,4 +459,10 @@ pub(crate) fn observe(
 #[pyfunction]
 pub(crate) fn glossary() -> PyResult<String> {
     Ok(serde_json::to_string(&nanotap::observe::glossary::glossary()).map_err(Failure::from)?)
+}
+
+/// The labels of the axes of observables, by name.
+#[pyfunction]
+pub(crate) fn labels() -> BTreeMap<&'static str, &'static str> {
+    OBSERVABLES.iter().map(|o| (o.name, o.label)).collect()
 }

@@ -2,14 +2,17 @@
 
 use std::collections::HashSet;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nanotap::Error;
+use nanotap::case::Case;
 use nanotap::frame::{Cell, Column, Frame};
 use nanotap::study::fit::Table;
 use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
-use nanotap::study::registry::{self, Answer, Document, Study as _, StudyEntry};
+use nanotap::study::registry::{self, Answer, Document, Study, StudyEntry};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
+use nanotap_figures::Figure;
 use nanotap_paper::{Options as PaperOptions, report_so_far, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -19,43 +22,66 @@ use crate::case::CaseCore;
 use crate::failure::Failure;
 use crate::watch::watched;
 
-/// A study: from the JSON of its request to its document, the JSON of its tables and its figure if
-/// `shown`, and whether Ctrl-C stopped it.
-#[pyfunction]
-#[pyo3(signature = (name, case, request, *, shown=false, threads=None, progress=None))]
-pub(crate) fn study(
-    py: Python<'_>,
-    name: &str,
-    case: &CaseCore,
-    request: &str,
-    shown: bool,
-    threads: Option<usize>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<(String, String, bool)> {
-    let entry = entry(name)?;
-    let request = json(request)?;
-    // Solved for once a case, not once a study.
-    let case = if entry.any_distance {
-        case.at_any_distance()
-    } else {
-        case.studied(py)?
-    };
-    let done = watched(py, progress, move |control| {
-        let answer = install(threads, || entry.answer(&case, request, control))??;
-        let shown = if shown {
-            shown_by(&*answer)?
-        } else {
-            String::new()
-        };
-        Ok((answer.document()?, shown))
-    })?;
-    let (document, shown) = done.result;
-    Ok((document, shown, done.interrupted))
+/// The report of a study, with the tables and the figure that front ends show of it. They are made
+/// when they are needed.
+#[pyclass(frozen, module = "nanotap._nanotap")]
+pub(crate) struct ReportCore(Mutex<Box<dyn Answer>>);
+
+impl ReportCore {
+    pub(crate) fn new(answer: impl Answer + 'static) -> Self {
+        Self(Mutex::new(Box::new(answer)))
+    }
+
+    /// Does `work` on the report without the interpreter lock.
+    fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&dyn Answer) -> Result<R, Error> + Send,
+    ) -> PyResult<R> {
+        let done = py.detach(|| {
+            let answer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            work(&**answer)
+        });
+        Ok(done.map_err(Failure::from)?)
+    }
 }
 
-/// The tables of a report, column by column as in its CSV file, and its figure, as JSON.
-fn shown_by(answer: &dyn Answer) -> Result<String, Error> {
-    let column = |frame: &Frame<'_>, column: &Column<'_>| {
+#[pymethods]
+impl ReportCore {
+    /// The document, JSON.
+    #[getter]
+    fn document(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |answer| answer.document())
+    }
+
+    /// The tables column by column, JSON.
+    #[getter]
+    fn tables(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |answer| {
+            let tables: Vec<Value> = answer.frames().iter().map(table_of).collect();
+            Ok(serde_json::to_string(&tables)?)
+        })
+    }
+
+    /// The CSV file that the terminal writes; `None` if there is none.
+    #[getter]
+    fn csv(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.with(py, |answer| Ok(answer.frames().first().map(Frame::csv)))
+    }
+
+    /// The figure, JSON; `None` if there is none.
+    #[getter]
+    fn figure(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.with(py, |answer| {
+            let figure = answer.figure().map(|figure| figure.to_json());
+            Ok(figure.transpose()?)
+        })
+    }
+}
+
+/// A table, column by column as in its CSV file.
+fn table_of(frame: &Frame<'_>) -> Value {
+    let column = |column: &Column<'_>| {
         let value = |row| match frame.cell(column, row) {
             Cell::Empty => Value::Null,
             Cell::Word(word) => word.into(),
@@ -69,18 +95,58 @@ fn shown_by(answer: &dyn Answer) -> Result<String, Error> {
             "values": (0..frame.rows).map(value).collect::<Vec<Value>>(),
         })
     };
-    let frames = answer.frames();
-    let tables = frames.iter().map(|frame| {
-        // A file may have a quantity twice, in two units; here it is in SI.
-        let mut names = HashSet::new();
-        let named = frame.columns.iter().filter(|c| !c.name.is_empty());
-        let once = named.filter(|c| names.insert(frame.name(c)));
-        let columns: Vec<Value> = once.map(|c| column(frame, c)).collect();
-        json!({ "name": frame.name, "columns": columns })
-    });
-    let figure = answer.figure().map(|figure| figure.to_json()).transpose()?;
-    let tables: Vec<Value> = tables.collect();
-    Ok(json!({ "tables": tables, "figure": figure }).to_string())
+    // A file may have a quantity twice, in two units; here it is in SI.
+    let mut names = HashSet::new();
+    let named = frame.columns.iter().filter(|c| !c.name.is_empty());
+    let once = named.filter(|c| names.insert(frame.name(c)));
+    let columns: Vec<Value> = once.map(column).collect();
+    json!({ "name": frame.name, "columns": columns })
+}
+
+/// The report of a study on a case, for studies that Python asks more of than their document.
+pub(crate) struct Kept<S: Study> {
+    pub(crate) case: Arc<Case>,
+    pub(crate) report: S::Report,
+}
+
+impl<S: Study> Answer for Kept<S> {
+    fn document(&self) -> Result<String, Error> {
+        let document = Document::of::<S>(&self.report, &self.case);
+        Ok(serde_json::to_string(&document)?)
+    }
+
+    fn frames(&self) -> Vec<Frame<'_>> {
+        S::frames(&self.case, &self.report)
+    }
+
+    fn figure(&self) -> Option<Figure> {
+        S::figure(&self.case, &self.report)
+    }
+}
+
+/// A study: from the JSON of its request to its report, and whether Ctrl-C stopped it.
+#[pyfunction]
+#[pyo3(signature = (name, case, request, *, threads=None, progress=None))]
+pub(crate) fn study(
+    py: Python<'_>,
+    name: &str,
+    case: &CaseCore,
+    request: &str,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(ReportCore, bool)> {
+    let entry = entry(name)?;
+    let request = json(request)?;
+    // Solved for once a case, not once a study.
+    let case = if entry.any_distance {
+        case.at_any_distance()
+    } else {
+        case.studied(py)?
+    };
+    let done = watched(py, progress, move |control| {
+        Ok(install(threads, || entry.answer(&case, request, control))??)
+    })?;
+    Ok((ReportCore(Mutex::new(done.result)), done.interrupted))
 }
 
 /// The study of this name.
@@ -119,14 +185,14 @@ pub(crate) fn json(request: &str) -> Result<Value, Failure> {
         .map_err(|error| Failure::input(format!("the request is not JSON: {error}")))
 }
 
-/// Lyapunov exponents (JSON) and the points of a section: phase in drive periods, tip, its
-/// rate, the gap's rate, then the state.
+/// Lyapunov exponents, and the points of a section: phase in drive periods, tip, its rate, the gap's
+/// rate, then the state.
 #[pyfunction]
 pub(crate) fn lyapunov<'py>(
     py: Python<'py>,
     case: &CaseCore,
     request: &str,
-) -> PyResult<(String, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<(ReportCore, Bound<'py, PyArray2<f64>>)> {
     let studied = case.studied(py)?;
     let request: LyapunovOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched(py, None, move |control| {
@@ -137,15 +203,14 @@ pub(crate) fn lyapunov<'py>(
                 .chain(p.state.iter().copied())
         });
         let width = 4 + report.section.first().map_or(0, |p| p.state.len());
-        Ok((
-            serde_json::to_string(&Document::new(&report, &studied))?,
-            rows.collect::<Vec<f64>>(),
-            width,
-        ))
+        let rows: Vec<f64> = rows.collect();
+        let case = studied;
+        Ok((Kept::<LyapunovStudy> { case, report }, rows, width))
     })?;
-    let (document, values, width) = done.result;
+    let (kept, values, width) = done.result;
     let shape = [values.len() / width, width];
-    Ok((document, PyArray1::from_vec(py, values).reshape(shape)?))
+    let rows = PyArray1::from_vec(py, values).reshape(shape)?;
+    Ok((ReportCore::new(kept), rows))
 }
 
 /// Recomputes the paper, with report and figures in the folder `out`: JSON, and whether Ctrl-C

@@ -5,10 +5,12 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nanotap::case::physical::Kind;
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, StoreError, Values, Work, WorkError, files, table};
 use nanotap::figure as figures;
+use nanotap::number::shortest;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin;
 use nanotap::study::fit::FitMap;
@@ -334,6 +336,45 @@ pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
         })
     };
     Ok(write()?)
+}
+
+/// The cells of a column of a table.
+#[derive(FromPyObject)]
+pub(crate) enum Cells {
+    Words(Vec<String>),
+    Counts(Vec<i64>),
+    Numbers(Vec<f64>),
+}
+
+impl Cells {
+    fn text(&self, row: usize) -> Option<String> {
+        match self {
+            Self::Words(words) => words.get(row).cloned(),
+            Self::Counts(counts) => counts.get(row).map(ToString::to_string),
+            Self::Numbers(numbers) => numbers.get(row).map(|number| match number {
+                missing if missing.is_nan() => String::new(),
+                number => shortest(*number),
+            }),
+        }
+    }
+}
+
+/// Columns as a CSV file, each with its name, its unit, which is shown if it is one of SI, and its
+/// cells; missing numbers are empty.
+#[pyfunction]
+pub(crate) fn csv(columns: Vec<(String, String, Cells)>) -> String {
+    let head = |(name, unit, _): &(String, String, Cells)| match Kind::of_si_unit(unit) {
+        Some(kind) if !kind.si_unit().is_empty() => format!("{name} ({unit})"),
+        _ => name.clone(),
+    };
+    let mut text = columns.iter().map(head).collect::<Vec<_>>().join(",") + "\n";
+    let row = |row: usize| -> Option<Vec<String>> {
+        columns.iter().map(|(.., cells)| cells.text(row)).collect()
+    };
+    for cells in (0..).map_while(row).take_while(|cells| !cells.is_empty()) {
+        text += &(cells.join(",") + "\n");
+    }
+    text
 }
 
 /// A map as a file of Gwyddion's.

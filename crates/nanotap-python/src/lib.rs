@@ -68,6 +68,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(figure::colours, module)?,
         wrap_pyfunction!(figure::describe, module)?,
         wrap_pyfunction!(dataset::gsf, module)?,
+        wrap_pyfunction!(dataset::csv, module)?,
         wrap_pyfunction!(dataset::write_table, module)?,
     ] {
         module.add_function(function)?;

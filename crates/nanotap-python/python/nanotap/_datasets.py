@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
     from ._cluster import Plan
+    from ._study_dataset import StudyDataset
 
 
 @stoppable()
@@ -33,7 +34,7 @@ def sweep(
     threads: int | None,
     client: "Client | None",
     progress: Progress,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """The runs over the parameters, lazily from `out` or in memory."""
     request = _arguments.request(
         "sweep", {**options, "over": _arguments.axes(options["over"])}
@@ -59,7 +60,7 @@ def basin(
     threads: int | None,
     client: "Client | None",
     progress: Progress,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """The points of the slice, lazily from `out` or in memory."""
     known = options["attractors"]
     if known is not None:
@@ -82,7 +83,7 @@ def _state_of(entry: Any, name: str) -> list[float]:
     return [float(value) for value in array]
 
 
-def open(path: Path) -> "xr.Dataset":
+def open(path: Path) -> "StudyDataset":
     """A sweep or basin written by the terminal or Python, loaded lazily.
 
     Its chunks are read when needed, through dask if it is installed.
@@ -110,10 +111,13 @@ def open(path: Path) -> "xr.Dataset":
     return _worded(ds.drop_encoding())
 
 
-def _worded(ds: "xr.Dataset") -> "xr.Dataset":
-    """`classification` in words, as in every other result, and as codes in the store; empty
+def _worded(whole: "xr.Dataset") -> "StudyDataset":
+    """The Dataset of a store: `classification` in words, as in every other result, and as codes in the store; empty
     where a run is missing.
     """
+    from ._study_dataset import StudyDataset
+
+    ds = StudyDataset.of(whole)
     codes = ds.get("classification")
     if codes is None:
         return ds
@@ -170,7 +174,7 @@ def window(
     threads: int | None,
     client: "Client | None",
     progress: Progress,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """The census at every point, with the consequences for imaging."""
     import xarray as xr
 
@@ -194,8 +198,8 @@ def window(
 
 
 def _judged(
-    ds: "xr.Dataset", dims: "tuple[Hashable, ...]", targets: Mapping[str, Any]
-) -> "xr.Dataset":
+    ds: "StudyDataset", dims: "tuple[Hashable, ...]", targets: Mapping[str, Any]
+) -> "StudyDataset":
     """Where the conditions of `where` hold; the region and the share as attributes."""
     import xarray as xr
 
@@ -230,7 +234,7 @@ def _path_of(ds: "xr.Dataset | Path") -> str:
 @contextmanager
 def _stored(
     out: Path | None, parent: str | None = None
-) -> "Iterator[tuple[str, Callable[[str, bool], xr.Dataset]]]":
+) -> "Iterator[tuple[str, Callable[[str, bool], StudyDataset]]]":
     """The store of a dataset, `out` or one in a folder that is deleted afterwards, and what reads
     it: from the store and whether the work was stopped.
     """
@@ -241,7 +245,7 @@ def _stored(
         yield os.path.join(folder, "dataset.zarr"), _in_memory
 
 
-def _lazy(store: str, stopped: bool) -> "xr.Dataset":
+def _lazy(store: str, stopped: bool) -> "StudyDataset":
     ds = open(store)
     if stopped:
         message = f"stopped; the finished part is in {store}; the same call resumes"
@@ -249,7 +253,7 @@ def _lazy(store: str, stopped: bool) -> "xr.Dataset":
     return ds
 
 
-def _in_memory(store: str, stopped: bool) -> "xr.Dataset":
+def _in_memory(store: str, stopped: bool) -> "StudyDataset":
     """The values of a store; of stopped work, those up to the last finished chunk."""
     import xarray as xr
 
@@ -285,14 +289,14 @@ def computed(
     threads: int | None,
     client: "Client | None",
     progress: Progress,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Computes the missing chunks of the store, then opens it."""
     if client is not None and chunk != "1/1":
         message = f"chunk {chunk}: a client computes all chunks; omit one of the two"
         raise ValueError(message)
     recipe = _recipe(plan, threads, progress)
 
-    def run(parent: str | None) -> "xr.Dataset":
+    def run(parent: str | None) -> "StudyDataset":
         with _stored(out, parent) as (store, read):
             stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
             return read(store, stopped)

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from xarray.indexes import PandasIndex
 
     from ._case import Case
+    from ._study_dataset import StudyDataset
+
+Described = TypeVar("Described", bound="xr.Dataset")
 
 _GLOSSARY = json.loads(_nanotap.glossary())
 
@@ -44,7 +47,7 @@ def _attributes(name: str) -> dict[str, str]:
     return {"long_name": entry["words"], "units": entry["unit"]}
 
 
-def describe(ds: "xr.Dataset") -> "xr.Dataset":
+def describe(ds: Described) -> Described:
     """The same Dataset, every variable with `long_name` and `units` if known."""
     for name, variable in ds.variables.items():
         for key, text in _attributes(str(name)).items():
@@ -53,14 +56,52 @@ def describe(ds: "xr.Dataset") -> "xr.Dataset":
 
 
 @cache
+def _schema(study: str) -> dict[str, Any]:
+    """The JSON schema of a study's report."""
+    schema: dict[str, Any] = json.loads(_nanotap.report_schema(study))
+    return schema
+
+
+@cache
 def declared(study: str, rows: str) -> dict[str, dict[str, str]]:
     """`long_name` and `units` of the columns of a report's rows, as Rust declares them."""
-    fields = json.loads(_nanotap.report_schema(study))["$defs"][rows]["properties"]
     return {
         name: {"long_name": one["x-label"].split(" $")[0], "units": one["x-unit"]}
-        for name, one in fields.items()
+        for name, one in _schema(study)["$defs"][rows]["properties"].items()
         if "x-label" in one
     }
+
+
+@cache
+def fields(study: str, part: str) -> dict[str, tuple[str, str]]:
+    """The entries of a part of a report (the report itself without a name): the unit of each and
+    the part that describes it, as Rust declares them; empty where there is none."""
+    whole = _schema(study)
+    node = whole["$defs"].get(part, {}) if part else whole
+    found: dict[str, tuple[str, str]] = {}
+    for choice in node.get("anyOf", ()):
+        found |= fields(study, _part(choice)) if _part(choice) else {}
+    for name, one in node.get("properties", {}).items():
+        found[name] = (one.get("x-unit", ""), _part(one))
+    return found
+
+
+def _part(node: Mapping[str, Any]) -> str:
+    """The part of a schema that describes a value or its items, or with a star each entry of it."""
+    if isinstance(inner := node.get("items"), dict):
+        return _part(inner)
+    if isinstance(inner := node.get("additionalProperties"), dict):
+        return f"*{_part(inner)}"
+    choices = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    names = (node.get("$ref", ""), *(choice.get("$ref", "") for choice in choices))
+    return next((name.rsplit("/", 1)[-1] for name in names if name), "")
+
+
+def derivative_unit(name: str, *, physical: bool) -> str:
+    """The unit of the observable of a derivative, in SI or in the model's units."""
+    words = _GLOSSARY["physical" if physical else "model"]
+    entry = words.get(name_in_si(name) if physical else name, {})
+    return str(entry.get("unit", ""))
 
 
 @lru_cache(maxsize=64)
@@ -76,7 +117,7 @@ def dataset(
     variables: Mapping[str, Any],
     coords: Mapping[str, Any],
     attributes: Mapping[str, Any],
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """A described Dataset of variables and coordinates, each as `(dims, values)` or
     `(dims, values, attributes)`; a plain array is the coordinate of a dimension. Its parts
     are prepared here, which takes half the time of xarray.
@@ -84,6 +125,8 @@ def dataset(
     import pandas as pd
     import xarray as xr
     from xarray.indexes import PandasIndex
+
+    from ._study_dataset import StudyDataset
 
     made: dict[str, xr.Variable] = {}
     own: dict[str, xr.Variable] = {}
@@ -103,13 +146,12 @@ def dataset(
             own[name] = variable
         else:
             made[name] = variable
-    return xr.Dataset(made, xr.Coordinates(own, indexes), attributes)
+    return StudyDataset(made, xr.Coordinates(own, indexes), attributes)
 
 
-def described(name: str, *, physical: bool) -> tuple[str, str]:
-    """Description and unit of an entry; empty if there are none."""
-    entry = _GLOSSARY["physical" if physical else "model"].get(name, {})
-    return str(entry.get("words", "")), str(entry.get("unit", ""))
+def described(name: str) -> str:
+    """Description of an entry; empty if there is none."""
+    return str(_GLOSSARY["model"].get(name, {}).get("words", ""))
 
 
 def case_attributes(case: "Case", title: str) -> dict[str, str]:

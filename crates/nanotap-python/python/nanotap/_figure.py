@@ -267,7 +267,7 @@ def _legend(axes: "Axes", place: str, more: list[Any]) -> int:
 def _columns_above(axes: "Axes", entries: dict[str, Any]) -> int:
     """Number of columns that fit, for letters half as wide as high."""
     bounds = axes.get_position()
-    width = 72 * bounds.width * axes.figure.get_figwidth()
+    width = 72 * bounds.width * axes.figure.bbox.width / axes.figure.dpi
     columns = [30 + 3.6 * len(words) for words in entries]
     if sum(columns) <= width:
         return len(columns)

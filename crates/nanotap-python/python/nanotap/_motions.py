@@ -14,11 +14,14 @@ from ._describe import case_attributes, dataset
 from ._interrupt import Interrupted, stoppable
 from ._progress import bar
 from ._quantity import Range, in_si, many, si_unit
+from ._report import Answer
 from ._results import Modes, Orbit
-from ._si import answered
+from ._si import answered, scales
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from ._study_dataset import StudyDataset
 
 # Largest number of periods of a time series by default.
 _SHOWN_PERIODS = 100
@@ -32,7 +35,7 @@ def modes(case: Case, options: Mapping[str, Any]) -> Modes:
     import xarray as xr
 
     request = _arguments.request("modes", options)
-    document, xi, shapes = _nanotap.modes(_cased(case)._core, request)
+    core, xi, shapes = _nanotap.modes(_cased(case)._core, request)
     table = xr.DataArray(
         shapes,
         dims=("xi", "mode"),
@@ -43,7 +46,9 @@ def modes(case: Case, options: Mapping[str, Any]) -> Modes:
     table.xi.attrs.update(
         long_name="position along the beam, clamp 0 to tip 1", units="L"
     )
-    return Modes.of(_document(document), shapes=table)
+    document = _document(core.document)
+    answer = Answer(core)
+    return Modes.of(document, scales(case), "modes", shapes=table, _answer=answer)
 
 
 @stoppable()
@@ -54,7 +59,7 @@ def simulate(
     threads: int | None,
     progress: Progress,
     parameters: Mapping[str, Any],
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """One run, or one for each value of the arrays in `parameters`."""
     case, varied = _split(case, options, parameters)
     _arguments.optional_count("threads", threads)
@@ -72,10 +77,9 @@ def simulate(
         else _arguments.count("series", series)
     )
     _refuse_rows(shown, _arguments.count("resolution", options["resolution"]))
-    document, (names, values) = _nanotap.simulate(case._core, request, shown)
-    if options["method"] == "rk4":
-        return _fixed_step(case, document, names, values)
-    return _run_dataset(case, document, names, values)
+    document, core, (names, values) = _nanotap.simulate(case._core, request, shown)
+    made = _fixed_step if options["method"] == "rk4" else _run_dataset
+    return made(case, document, names, values).answered_by(Answer(core))
 
 
 @stoppable()
@@ -95,7 +99,7 @@ def orbit(
     request = _arguments.request("orbit", options)
     resolution = _arguments.count("resolution", options["resolution"])
     _refuse_rows(1, resolution)
-    document = _nanotap.orbit(case._core, request)
+    document, core = _nanotap.orbit(case._core, request)
     state, period = document["state"], document["period"]
 
     def series() -> "xr.Dataset":
@@ -104,7 +108,10 @@ def orbit(
         attributes = case_attributes(case, "a periodic orbit")
         return answered(case, dataset(variables, coords, attributes))
 
-    return Orbit.of(document, made_series=series)
+    answer = Answer(core)
+    return Orbit.of(
+        document, scales(case), "orbit", made_series=series, _answer=answer
+    )
 
 
 def _document(text: str) -> dict[str, Any]:
@@ -195,7 +202,7 @@ def _recorded(
 
 def _run_dataset(
     case: Case, document: dict[str, Any], names: list[str], values: Floats
-) -> "xr.Dataset":
+) -> "StudyDataset":
     series, times = _columns(names, values)
     entries = case.state_names
     recorded, coords = _recorded(document, entries)
@@ -254,7 +261,7 @@ def _vector(name: str, value: list[Any], entries: list[str]) -> Any:
 
 def _fixed_step(
     case: Case, parsed: dict[str, Any], names: list[str], values: Floats
-) -> "xr.Dataset":
+) -> "StudyDataset":
 
     exact = parsed.pop("exact")
     steps = parsed.pop("steps")
@@ -300,7 +307,7 @@ def _over(
     states: Floats | None,
     threads: int | None,
     progress: Progress,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """A Dataset over the product of arrays, or over the dimensions of DataArrays; with several
     initial states also over `start`."""
     import xarray as xr

@@ -12,16 +12,17 @@ import numpy.typing as npt
 
 from ._arguments import Floats
 from ._record import Record
+from ._report import Answer, Answered, Report
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from ._case import Case
+    from ._si import Scales
 
 
-class Fit(Record):
+class Fit(Report):
     """The result of a fit, with the names of the terminal's JSON."""
 
     __slots__ = ()
@@ -148,11 +149,8 @@ class Fit(Record):
         strong = sorted((pair for pair in pairs_ if pair[0] >= 0.1), reverse=True)
         return lines + [text for _, text in strong]
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Fit, (self.to_dict(),)
 
-
-class Reconstruction(Record):
+class Reconstruction(Report):
     """A reconstructed force, with the names of the terminal's JSON."""
 
     __slots__ = ()
@@ -170,9 +168,6 @@ class Reconstruction(Record):
         table = self["table"]
         pairs = zip(table["distance"], table["force"], strict=True)
         return json.dumps([*rows, *map(list, pairs)])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Reconstruction, (self.to_dict(),)
 
 
 def _of_curve(parameter: Mapping[str, Any]) -> str:
@@ -192,8 +187,11 @@ def pairs(value: Sequence[Sequence[float]]) -> npt.NDArray[np.complex128]:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Result:
+class Result(Answered):
     """A result: its main entries are fields, the others are accessible by name too.
+
+    Of a physical case numbers are in SI, except states; `units` has the unit of each, and
+    `to_dict()` the document as the terminal writes it.
 
     Attributes:
         document: The whole document, as in the terminal's JSON.
@@ -203,20 +201,31 @@ class Result:
 
     document: Record = field(kw_only=True)
     notes: list[str] = field(default_factory=list, kw_only=True)
+    _answer: Answer | None = field(default=None, kw_only=True)
 
     _arrays: ClassVar[frozenset[str]] = frozenset()
     _complex: ClassVar[frozenset[str]] = frozenset()
 
     @classmethod
-    def of(cls, document: Mapping[str, Any], **further: Any) -> Self:
+    def of(
+        cls,
+        document: Mapping[str, Any],
+        scales: "Scales | None" = None,
+        study: str = "",
+        **further: Any,
+    ) -> Self:
         """The result of a document; `further` has fields that are not in the document."""
-        record = document if isinstance(document, Record) else Record(document)
+        record = (
+            document
+            if isinstance(document, Record)
+            else Record(document, scales, (study, "") if study else None)
+        )
         values: dict[str, Any] = {"document": record, **further}
         for name in cls.__dataclass_fields__:
             if name in values or name not in record._entries:
                 continue
             if name in cls._arrays or name in cls._complex:
-                value = record._entries[name]
+                value = record[name]
                 made = floats if name in cls._arrays else pairs
                 values[name] = None if value is None else made(value)
             else:
@@ -244,8 +253,13 @@ class Result:
 
     __hash__ = object.__hash__
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of the entries that have one."""
+        return self.document.units
+
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain dictionaries and lists."""
+        """Everything as plain dictionaries and lists, as in the terminal's JSON."""
         return self.document.to_dict()
 
 
@@ -263,11 +277,11 @@ class Modes(Result):
 
     Attributes:
         modes: Number of modes.
-        free: Frequencies in free flight (N, Ω).
-        contact: Frequencies in contact (N, Ω).
-        exact_free: Those of the beam itself, in free flight (N, Ω); empty where the modes of the
+        free: Frequencies in free flight (N): Ω, of a physical case in Hz.
+        contact: Frequencies in contact (N), likewise.
+        exact_free: Those of the beam itself, in free flight (N); empty where the modes of the
             lever were measured.
-        exact_contact: Those of the beam itself, in contact (N, Ω); empty likewise.
+        exact_contact: Those of the beam itself, in contact (N); empty likewise.
         shapes: The mode shapes φ_j(ξ) of the bare beam, over `xi` and `mode`.
     """
 
@@ -299,9 +313,7 @@ class Modes(Result):
 
 
 class _Observed:
-    """Observables of an orbit, in the model's units, from its document, which has only the
-    requested ones.
-    """
+    """Observables of an orbit from its document, which has only the requested ones."""
 
     tip_max: float
     tip_min: float
@@ -360,18 +372,18 @@ class Orbit(_Observed, Result):
         stable: Whether every multiplier is inside the unit circle.
         stability: stable, unstable or marginal.
         events: Contacts begun and ended: `tau`, `kind`, `gap_rate`.
-        tip_max: Largest tip deflection W (g0).
-        tip_min: Smallest tip deflection W (g0).
-        amplitude: Half of the peak-to-peak value of W (g0).
+        tip_max: Largest tip deflection W (g0 or m).
+        tip_min: Smallest tip deflection W (g0 or m).
+        amplitude: Half of the peak-to-peak value of W (g0 or m).
         contact_fraction: Contact time / period.
-        peak_force: Largest force of the sample on the tip (EI g0/L³).
+        peak_force: Largest force of the sample on the tip (EI g0/L³ or N).
         energy_balance: Energy input and losses: `drive_work`, `beam_damping`,
             `sample_damping`, `stored`, `residual`.
         harmonics: Components: `order`, `tip`, `tip_phase`, `force`, `force_phase`,
             `slope`.
         thd: Fraction of the tip deflection's power outside the drive's frequency.
         phase: Phase lag of the tip deflection behind the drive, degrees.
-        first_harmonic: Amplitude of the tip deflection at the drive's frequency (g0).
+        first_harmonic: Amplitude of the tip deflection at the drive's frequency (g0 or m).
         physical: Observables in SI, if the case is physical.
         derivatives: Derivatives by the requested keys: `state`, the
             observables, `physical`.
@@ -383,7 +395,7 @@ class Orbit(_Observed, Result):
             `unique_within`.
         made_series: Function that computes the time series.
 
-    Lengths and forces are in the model's units; `physical` has them in SI.
+    Lengths and forces are in the model's units, of a physical case in SI.
     """
 
     period: int
@@ -433,7 +445,7 @@ class Orbit(_Observed, Result):
         return in_si(self.series)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _orbit_again, (self.document.to_dict(), self.series)
+        return _orbit_again, (self.document, self.series, self._answer)
 
     @property
     def spectral_radius(self) -> float:
@@ -448,12 +460,6 @@ class Orbit(_Observed, Result):
             "order"
         )
 
-    def plot(self, **options: Any) -> "Figure":
-        """The orbit as the terminal draws it; see `nanotap.plot.orbit`."""
-        from . import plot
-
-        return plot.orbit(self, **options)
-
     def __repr__(self) -> str:
         return (
             f"Orbit(period={self.period}, {self.stability}, largest multiplier "
@@ -464,15 +470,14 @@ class Orbit(_Observed, Result):
         """A table for notebooks, in SI if the case is physical."""
         from ._describe import described
 
-        shown = self.physical if self.physical is not None else self.document
         rows = [
             ("period", str(self.period), "drive periods"),
             ("stability", self.stability, ""),
             ("largest multiplier", _number(self.spectral_radius), ""),
         ]
-        for name, value in shown.items():
-            words, unit = described(name, physical=self.physical is not None)
-            if words and isinstance(value, float) and not name.endswith("_eV"):
+        for name, unit in self.units.items():
+            words, value = described(name), self.document[name]
+            if words and isinstance(value, float):
                 rows.append((words, _number(value), "" if unit == "1" else unit))
         cells = "".join(
             f"<tr><td>{escape(words)}</td><td style='text-align:right'>{escape(value)}</td>"
@@ -483,18 +488,19 @@ class Orbit(_Observed, Result):
 
 
 def _swing(motion: "Orbit | Attractor") -> str:
-    """The range of the tip deflection, of a physical case in SI; chosen observables may lack it."""
-    physical = motion.document.get("physical")
-    unit = "" if physical is None else " m"
-    shown = motion.document if physical is None else physical
-    low, high = shown.get("tip_min"), shown.get("tip_max")
+    """The range of the tip deflection; chosen observables may lack it."""
+    low, high = motion.document.get("tip_min"), motion.document.get("tip_max")
     if low is None or high is None:
         return ""
-    return f", W from {_number(low)} to {_number(high)}{unit}"
+    unit = motion.units.get("tip_max", "")
+    shown = f" {unit}" if unit == "m" else ""
+    return f", W from {_number(low)} to {_number(high)}{shown}"
 
 
-def _orbit_again(document: Mapping[str, Any], series: "xr.Dataset | None") -> Orbit:
-    return Orbit.of(document, made_series=series)
+def _orbit_again(
+    document: Record, series: "xr.Dataset | None", answer: Answer | None
+) -> Orbit:
+    return Orbit.of(document, made_series=series, _answer=answer)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -511,9 +517,9 @@ class Attractor(Result):
         state: A state on it, at drive phase 0 (n).
         states: States at phase 0 of all periods of an orbit (period × n).
         multipliers: Floquet multipliers of an orbit (n).
-        tip_max: Largest tip deflection W (g0).
-        tip_min: Smallest tip deflection W (g0).
-        amplitude: Half of the peak-to-peak value of W (g0).
+        tip_max: Largest tip deflection W (g0 or m).
+        tip_min: Smallest tip deflection W (g0 or m).
+        amplitude: Half of the peak-to-peak value of W (g0 or m).
         contact_fraction: Contact time / period.
         proof: Result of the proof for an orbit, if requested, as in `Orbit`.
     """
@@ -546,12 +552,15 @@ class Attractor(Result):
         return f"Attractor({self.name}, {share}{_swing(self)})"
 
 
-class Attractors(Sequence[Attractor]):
+class Attractors(Answered, Sequence[Attractor]):
     """A census: the attractors as a sequence, largest share first, and its other results."""
 
-    def __init__(self, case: "Case", document: Mapping[str, Any]) -> None:
+    def __init__(
+        self, case: "Case", document: Record, answer: Answer | None = None
+    ) -> None:
         self.case = case
-        self.document = Record(document)
+        self.document = document
+        self._answer = answer
         self._list = [Attractor.of(entry) for entry in self.document["attractors"]]
 
     @overload
@@ -618,12 +627,6 @@ class Attractors(Sequence[Attractor]):
         ]
         rows = [[getattr(one, name) for name in columns] for one in self]
         return pd.DataFrame(rows, columns=columns)
-
-    def plot(self, **options: Any) -> "Figure":
-        """The attractors as the terminal draws them; see `nanotap.plot.attractors`."""
-        from . import plot
-
-        return plot.attractors(self, **options)
 
     def __repr__(self) -> str:
         lines = [f"  {one!r}" for one in self]

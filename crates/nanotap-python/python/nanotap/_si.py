@@ -2,9 +2,11 @@
 
 import json
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-from ._describe import name_in_si
+from ._describe import Described, name_in_si
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -12,9 +14,36 @@ if TYPE_CHECKING:
     from ._case import Case
 
 
-def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
+class Scales:
+    """The model's units of a physical case in SI."""
+
+    def __init__(self, case: "Case | None", known: dict[str, Any] | None = None) -> None:
+        self._case = case
+        if known is not None:
+            self._factors = known
+
+    @cached_property
+    def _factors(self) -> dict[str, tuple[float, str]]:
+        assert self._case is not None
+        return _factors(json.loads(self._case._core.document_at_setpoint))
+
+    def of(self, unit: str) -> tuple[float, str]:
+        """Factor of numbers in one of the model's units, and their unit in SI; 1 and the unit itself
+        of another."""
+        return self._factors.get(unit, (1.0, unit)) if unit else (1.0, "")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scales, (None, self._factors)
+
+
+def scales(case: "Case") -> Scales | None:
+    """The units of a case whose results are in SI."""
+    return Scales(case) if case.is_physical and not case._core.model_units else None
+
+
+def _factors(case: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     """The model's units in SI."""
-    physical = json.loads(ds.attrs.get("case", "{}")).get("physical")
+    physical = case.get("physical")
     if physical is None:
         message = "the case is not in physical quantities: it has no unit of length"
         raise ValueError(message)
@@ -32,11 +61,11 @@ def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
     }
 
 
-def answered(case: "Case", ds: "xr.Dataset") -> "xr.Dataset":
+def answered(case: "Case", ds: Described) -> Described:
     """A result of a case as its user sees it: of a physical case in SI unless it is in the model's
     units.
     """
-    return in_si(ds) if case.is_physical and not case._core.model_units else ds
+    return ds if scales(case) is None else in_si(ds)
 
 
 def _keeps_units(ds: "xr.Dataset", key: str) -> bool:
@@ -45,7 +74,7 @@ def _keeps_units(ds: "xr.Dataset", key: str) -> bool:
     return numbers and (key == "gap.tip" or key.startswith(("sample.", "drive.")))
 
 
-def in_si(ds: "xr.Dataset") -> "xr.Dataset":
+def in_si(ds: Described) -> Described:
     """A result of a case in the model's units (`model_units=True`), converted to SI. States, which
     have several units, stay in the model's units. So do variables without a counterpart in SI if
     a physical quantity varies, and with it the model's units.
@@ -53,7 +82,7 @@ def in_si(ds: "xr.Dataset") -> "xr.Dataset":
     Raises:
         ValueError: the case is not physical.
     """
-    units = _units(ds)
+    units = _factors(json.loads(ds.attrs.get("case", "{}")))
     varies = not all(
         _keeps_units(ds, key) for key in json.loads(ds.attrs.get("over", "[]"))
     )

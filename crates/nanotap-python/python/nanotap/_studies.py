@@ -13,7 +13,8 @@ from ._describe import case_attributes, declared, describe
 from ._interrupt import Interrupted, part_of, stoppable
 from ._motions import _cased, _document, words
 from ._progress import bar
-from ._report import Report
+from ._record import Record, plain
+from ._report import Answer, Report
 from ._results import (
     Attractors,
     Convergence,
@@ -22,11 +23,12 @@ from ._results import (
     Paper,
     Reconstruction,
 )
-from ._si import answered
+from ._si import answered, scales
 
 if TYPE_CHECKING:
-    import xarray as xr
     from distributed import Client
+
+    from ._study_dataset import StudyDataset
 
 Found = TypeVar("Found")
 
@@ -38,29 +40,16 @@ def _run(
     options: Mapping[str, Any],
     threads: int | None = None,
     progress: Progress = None,
-) -> tuple[dict[str, Any], bool]:
-    """The document of a study, and whether it was stopped by Ctrl-C."""
-    text, _, interrupted = _ran(name, case, options, threads, progress)
-    return _document(text), interrupted
-
-
-def _ran(
-    name: str,
-    case: Case,
-    options: Mapping[str, Any],
-    threads: int | None,
-    progress: Progress,
-    shown: bool = False,
-) -> tuple[str, str, bool]:
-    """The JSON of a study's document, that of its tables and figure if `shown`, and whether it was
-    stopped by Ctrl-C."""
+) -> tuple[dict[str, Any], Answer, bool]:
+    """The document of a study, its tables and figure, and whether it was stopped by Ctrl-C."""
     core = _cased(case)._core
     request = _arguments.request(name, options)
     many = _arguments.optional_count("threads", threads)
     with bar(progress, _arguments.counted(name)) as show:
-        return _nanotap.study(
-            name, core, request, shown=shown, threads=many, progress=show
+        report, interrupted = _nanotap.study(
+            name, core, request, threads=many, progress=show
         )
+    return _document(report.document), Answer(report), interrupted
 
 
 @stoppable()
@@ -68,8 +57,9 @@ def attractors(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Attractors:
     """A census; the finished part if Ctrl-C stopped it."""
-    document, interrupted = _run("attractors", case, options, threads, progress)
-    found = Attractors(case, document)
+    document, answer, interrupted = _run("attractors", case, options, threads, progress)
+    record = Record(document, scales(case), ("attractors", ""))
+    found = Attractors(case, record, answer)
     if interrupted:
         message = "stopped before all starts were finished: the fractions refer to the finished ones"
         raise Interrupted(message, found)
@@ -88,14 +78,15 @@ def _finished(found: Found, interrupted: bool, *, part: bool = True) -> Found:
 @stoppable()
 def branch(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Branches over `point`; the finished part if Ctrl-C stopped it."""
-    document, interrupted = _run("branch", case, options, threads, progress)
-    return _finished(_branch_dataset(case, document), interrupted)
+    document, answer, interrupted = _run("branch", case, options, threads, progress)
+    ds = _branch_dataset(case, document).answered_by(answer)
+    return _finished(ds, interrupted)
 
 
-def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
-    import xarray as xr
+def _branch_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
+    from ._study_dataset import StudyDataset
 
     name = report["parameter"]
     entries = case.state_names
@@ -129,7 +120,7 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     coords: dict[str, Any] = {name: (dims, values), "state": words(entries)}
     coords["part"] = words(("re", "im"))
     symbols = {key: symbol for key, symbol, _ in case._core.parameters}
-    ds = xr.Dataset(variables, coords)
+    ds = StudyDataset(variables, coords)
     loci = report.get("loci")
     if loci:
         curves = loci["curves"]
@@ -157,8 +148,7 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ds.attrs.update(
         parameter=name,
         parameter_symbol=symbols.get(name, name),
-        branches=json.dumps(report["branches"]),
-        failures=json.dumps(report["failures"]),
+        **_shown(case, "branch", report, ("branches", "failures")),
     )
     unit = report.get("parameter_unit")
     if unit:
@@ -174,6 +164,14 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     if report.get("held"):
         ds.attrs["held"] = json.dumps(report["held"])
     return answered(case, describe(ds))
+
+
+def _shown(
+    case: Case, study: str, report: Mapping[str, Any], names: Iterable[str]
+) -> dict[str, str]:
+    """Entries of a report as attributes: JSON, in SI if the other numbers are."""
+    record = Record(report, scales(case), (study, ""))
+    return {name: json.dumps(plain(record[name])) for name in names if name in record}
 
 
 def _joined(parts: Iterable[list[float]]) -> "np.typing.NDArray[np.float64]":
@@ -219,18 +217,21 @@ def _columns(
 @stoppable()
 def approach(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """An approach curve over `way` and distance; the finished part if Ctrl-C stopped it."""
-    document, interrupted = _run("approach", case, options, threads, progress)
+    document, answer, interrupted = _run("approach", case, options, threads, progress)
     if interrupted and not document["table"]:
         raise part_of(None, finished=False)
-    return _finished(_approach_dataset(case, document), interrupted)
+    ds = _approach_dataset(case, document).answered_by(answer)
+    return _finished(ds, interrupted)
 
 
-def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
-    import xarray as xr
+def _approach_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
+    from ._study_dataset import StudyDataset
 
     name = report["parameter"]
+    kept = ("hysteresis", "jumps", "modulation")
+    shown = _shown(case, "approach", report, kept)
     ways = ["approach", "retract"]
     rows: dict[tuple[str, float], dict[str, Any]] = {}
     for entry in report["table"]:
@@ -259,7 +260,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     branches = report.get("branches") or {"points": []}
     entries = case.state_names
     further = _columns(branches["points"], "branch_point", "branch_", len(entries))
-    ds = xr.Dataset(variables, coords)
+    ds = StudyDataset(variables, coords)
     if further:
         coords["state"] = words(entries)
         ds = ds.assign(further).assign_coords(
@@ -275,13 +276,13 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ds.attrs.update(case_attributes(case, "approach and retract"))
     ds.attrs.update(
         parameter=name,
-        hysteresis=json.dumps(report["hysteresis"]),
-        jumps=json.dumps(report["jumps"]),
+        hysteresis=shown["hysteresis"],
+        jumps=shown["jumps"],
         compared=int(report["compared"]),
         returned=int(report["returned"]),
     )
     if "modulation" in report:
-        ds.attrs["modulation"] = json.dumps(report["modulation"])
+        ds.attrs["modulation"] = shown["modulation"]
     unit = report.get("parameter_unit")
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
@@ -310,11 +311,11 @@ def scan(
     threads: int | None,
     client: "Client | None",
     progress: Progress,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Height, error, phase … over direction, line and pixel; the finished part if Ctrl-C stopped it."""
     if out is None and chunk == "1/1" and client is None:
-        document, interrupted = _run("scan", case, options, threads, progress)
-        found = _scan_dataset(case, document)
+        document, answer, interrupted = _run("scan", case, options, threads, progress)
+        found = _scan_dataset(case, document).answered_by(answer)
         return _finished(found, interrupted, part=bool(found.sizes["y"]))
     plan = ("scan", case, _arguments.request("scan", options))
     ds = _datasets.computed(plan, "lines", out, chunk, threads, client, progress)
@@ -324,8 +325,8 @@ def scan(
     return whole.assign_attrs(path=ds.attrs["path"])
 
 
-def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
-    import xarray as xr
+def _scan_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
+    from ._study_dataset import StudyDataset
 
     ways = [way for way in ("trace", "retrace") if report.get(way)]
     variables: dict[str, Any] = {}
@@ -353,7 +354,7 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
             coords["k"] = entry
         else:
             variables[f"period_{name}"] = entry
-    ds = xr.Dataset(variables, coords)
+    ds = StudyDataset(variables, coords)
     ds.attrs.update(case_attributes(case, "scan"))
     for name, value in report.items():
         if name not in {"trace", "retrace", "periods"} and value is not None:
@@ -388,7 +389,7 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     """The exponents, and the points of the section as a Dataset."""
     import xarray as xr
 
-    text, rows = _nanotap.lyapunov(
+    core, rows = _nanotap.lyapunov(
         _cased(case)._core, _arguments.request("lyapunov", options)
     )
     entries = case.state_names
@@ -407,14 +408,21 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     )
     cut.phase.attrs.update(long_name="drive phase", units="degrees")
     cut.gap_rate.attrs.update(long_name="rate of the gap", units="g0 sqrt(EI/(m L^4))")
-    return Lyapunov.of(_document(text), section=answered(case, describe(cut)))
+    return Lyapunov.of(
+        _document(core.document),
+        scales(case),
+        "lyapunov",
+        section=answered(case, describe(cut)),
+        _answer=Answer(core),
+    )
 
 
 @stoppable()
 def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:
     """The motion for each number of modes."""
-    document, interrupted = _run("convergence", case, options)
-    return _finished(Convergence.of(document), interrupted)
+    document, answer, interrupted = _run("convergence", case, options)
+    found = Convergence.of(document, scales(case), "convergence", _answer=answer)
+    return _finished(found, interrupted)
 
 
 @stoppable()
@@ -427,8 +435,9 @@ def document(
 ) -> Report:
     """The report of a study: its document, with the names of the terminal's JSON, its tables and its
     figure."""
-    text, shown, interrupted = _ran(name, case, options, threads, progress, shown=True)
-    return _finished(Report(_document(text), shown), interrupted)
+    report, answer, interrupted = _run(name, case, options, threads, progress)
+    found = Report(report, answer, scales(case), (name, ""))
+    return _finished(found, interrupted)
 
 
 @stoppable()
@@ -445,8 +454,8 @@ def fit(
         if options[name] is not None
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
-    document, interrupted = _run("fit", case, asked, threads, progress)
-    return _finished(Fit(document), interrupted)
+    document, answer, interrupted = _run("fit", case, asked, threads, progress)
+    return _finished(Fit(document, answer), interrupted)
 
 
 @stoppable()
@@ -462,7 +471,7 @@ def fit_map(
     client: "Client | None" = None,
     progress: Progress = None,
     **options: Any,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Fits a force volume: one curve a pixel, each from the result of its neighbour.
 
     Args:
@@ -527,8 +536,10 @@ def reconstruct(
         if options[name] is not None
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
-    document, interrupted = _run("reconstruct", case, asked, threads, progress)
-    return _finished(Reconstruction(document), interrupted)
+    document, answer, interrupted = _run(
+        "reconstruct", case, asked, threads, progress
+    )
+    return _finished(Reconstruction(document, answer), interrupted)
 
 
 def paper(

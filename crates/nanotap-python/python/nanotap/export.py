@@ -16,7 +16,7 @@ import pandas as pd
 
 from . import _arguments, _nanotap
 from ._case import Path
-from ._report import Report
+from ._report import Answered
 from ._results import Attractors, Convergence, Modes, Orbit, Paper
 
 if TYPE_CHECKING:
@@ -32,13 +32,13 @@ def table(result: Any) -> pd.DataFrame:
     """
     if isinstance(result, Attractors | Convergence | Modes | Paper):
         return result.table()
-    if isinstance(result, Report):
-        return result.to_dataframe()
     if isinstance(result, Orbit):
         if result.series is None:
             message = "only an orbit found by nanotap.orbit has a time series"
             raise ValueError(message)
         return _frame(result.series, ("tau",))
+    if isinstance(result, Answered):
+        return result.to_dataframe()
     if not hasattr(result, "data_vars"):
         message = f"a {type(result).__name__} cannot be converted to a table"
         raise TypeError(message)
@@ -76,9 +76,57 @@ def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
 
 
 def csv(result: Any, path: Path) -> None:
-    """The table of a result as CSV."""
-    frame = table(result)
-    _written(path, lambda name: frame.to_csv(name))
+    """A result as CSV: the terminal's file, byte for byte. What xarray made of a result, such as a
+    selection of an approach curve, and results over arrays have that of `table`.
+    """
+    text = _terminal_file(result)
+    if text is None:
+        frame = table(result)
+        _written(path, lambda name: frame.to_csv(name))
+        return
+
+    def write(name: str) -> None:
+        with open(name, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+
+    _written(path, write)
+
+
+def _terminal_file(result: Any) -> str | None:
+    """The text of the terminal's file, if the result has one."""
+    if (answer := getattr(result, "_answer", None)) is not None:
+        return str(answer.csv)
+    for name in ("classification", "attractor", "result"):
+        if name in getattr(result, "variables", ()) and "path" not in result.dims:
+            dims = tuple(map(str, result[name].dims))
+            if dims and any("flag_meanings" in v.attrs for v in result.values()):
+                return _grid(result, dims)
+    return None
+
+
+# What Python adds to the variables of a store.
+_ADDED = {"classification_code", "condition", "holds"}
+
+
+def _grid(ds: "xr.Dataset", dims: tuple[str, ...]) -> str:
+    """One row per entry of a grid: the coordinates along its axes, then the variables."""
+    along = [
+        (name, ds[name])
+        for dim in dims
+        for name in sorted(ds.coords, key=lambda name: name != dim)
+        if ds[name].dims == (dim,)
+    ]
+    measured = [
+        (name, variable)
+        for name, variable in ds.data_vars.items()
+        if variable.dims == dims and name not in _ADDED
+    ]
+    like = measured[0][1]
+    columns = []
+    for name, variable in along + measured:
+        cells = variable.broadcast_like(like).transpose(*dims).values.ravel()
+        columns.append((str(name), str(variable.attrs.get("units", "")), cells.tolist()))
+    return _nanotap.csv(columns)
 
 
 def parquet(result: Any, path: Path) -> None:
@@ -189,12 +237,12 @@ def gsf(
     _written(path, write)
 
 
-# Units in Gwyddion's spelling; those of the dimensionless model are empty.
-_GWYDDION = {"m", "N", "J", "s", "Hz", "N/m", "Pa", "m/s", "W", "eV"}
-
-
 def _gwyddion(unit: object) -> str:
-    return "deg" if unit == "degree" else str(unit) if unit in _GWYDDION else ""
+    """A unit in Gwyddion's spelling; empty if it is not one of SI."""
+    if unit == "degree":
+        return "deg"
+    is_si = unit == "eV" or _nanotap.axis(str(unit), 1.0)[1] != ""
+    return str(unit) if is_si else ""
 
 
 def _shared_unit(x: object, y: object) -> str:

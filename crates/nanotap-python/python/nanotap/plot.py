@@ -12,24 +12,24 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-from . import _nanotap, _signatures
-from ._case import Case
+from . import _nanotap
 from ._describe import name_in_si
 from ._figure import STYLE, Picture, draw, page
-from ._report import Report
-from ._results import (
-    Attractors,
-    Convergence,
-    Fit,
-    Lyapunov,
-    Modes,
-    Orbit,
-    Reconstruction,
-)
+from ._report import Answered
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from ._results import (
+        Attractors,
+        Convergence,
+        Fit,
+        Lyapunov,
+        Modes,
+        Orbit,
+        Reconstruction,
+    )
 
 __all__ = [
     "LINES",
@@ -49,6 +49,7 @@ __all__ = [
     "page",
     "reconstruct",
     "run",
+    "scan",
     "section",
     "show",
     "sweep",
@@ -68,19 +69,7 @@ LINES, PERIODS, MOTIONS = _nanotap.colours()
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, _ = LINES
 YELLOW, GREY, LIGHT_GREY = "#f0e442", "#808080", "#e2e2e2"
 
-_LABELS = {
-    "tip_max": "largest tip deflection $W_{max}$",
-    "tip_min": "smallest tip deflection $W_{min}$",
-    "amplitude": "amplitude (half of peak to peak)",
-    "first_harmonic": "amplitude at the drive frequency",
-    "phase": "phase (°)",
-    "contact_fraction": "contact time / period",
-    "peak_force": "peak force",
-    "dissipation": "dissipation $E_{dis}$",
-    "indentation": "indentation",
-    "impact_speed": "impact speed",
-    "spectral_radius": "largest |$μ$|",
-}
+_LABELS = _nanotap.labels()
 
 
 def _drawn(
@@ -95,6 +84,12 @@ def _drawn(
         for name, values in (columns or {}).items()
     }
     return draw(_nanotap.describe(study, json.dumps(facts), arrays), **where)
+
+
+def _whole(ds: "xr.Dataset") -> str | None:
+    """The figure of a result that is as its study returned it."""
+    answer = getattr(ds, "_answer", None)
+    return None if answer is None else str(answer.figure)
 
 
 def _points(x: Any, y: Any) -> list[list[float]]:
@@ -115,37 +110,28 @@ def _period_of(ds: "xr.Dataset") -> float:
     return period * case["physical"]["time_unit"] if in_seconds else period
 
 
-def _scale(*variables: "xr.DataArray") -> tuple[float, str]:
+def _scale(*variables: "xr.DataArray", natural: float = 0.0) -> tuple[float, str]:
     """What multiplies variables of one unit where they are drawn, and the unit in brackets: with
-    the prefix that fits if it is one of SI.
+    the prefix that fits if it is one of SI. A natural size replaces values that are rounding.
     """
     unit = str(variables[0].attrs.get("units", "1"))
-    if unit not in _SI:
-        return 1.0, ""
-    return _prefixed(np.concatenate([np.ravel(v.values) for v in variables]), unit)
-
-
-# Units that take a prefix.
-_SI = {"m", "s", "N", "J", "W", "Hz", "Pa", "m/s", "N/m", "eV"}
-
-
-def _is_beam(ds: "xr.Dataset") -> bool:
-    return "stiffness" not in _case_of(ds)
+    values = np.abs(np.concatenate([np.ravel(v.values) for v in variables]))
+    size = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+    if size <= 1e-9 * natural:
+        size = natural
+    of_taps = unit == "eV"
+    factor, shown = _nanotap.axis("J" if of_taps else unit, size)
+    shown = f"{shown.removesuffix('J')}eV" if of_taps else shown
+    return factor, f" ({shown})" if shown else ""
 
 
 def _motion(
-    ds: "xr.Dataset",
-    title: str,
-    periods: float,
-    endless: bool = False,
-    scales: tuple[tuple[float, str], tuple[float, str]] | None = None,
+    ds: "xr.Dataset", title: str, periods: float, endless: bool
 ) -> dict[str, Any]:
     """A time series as curves."""
     time = ds.tau.values / _period_of(ds)
     shown = time <= periods + 1e-9
-    if scales is None:
-        scales = _scale(ds.tip), _scale(ds.tip_rate)
-    (length, length_unit), (speed, speed_unit) = scales
+    (length, length_unit), (speed, speed_unit) = _scale(ds.tip), _scale(ds.tip_rate)
     tip, rate = length * ds.tip.values, speed * ds.tip_rate.values
     contact = np.append(False, np.append(ds.contact.values[shown], False)).astype(int)
     begun, ended = (
@@ -155,7 +141,7 @@ def _motion(
     whole = (np.abs(time - np.round(time)) < 1e-9) & (time < time.max() - 0.5)
     return {
         "axes": {
-            "beam": _is_beam(ds),
+            "beam": "stiffness" not in _case_of(ds),
             "length": length_unit,
             "velocity": speed_unit,
         },
@@ -175,6 +161,8 @@ def run(
     ds: "xr.Dataset", *, periods: float | None = None, **where: Unpack[Where]
 ) -> "Figure":
     """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
+    if periods is None and (figure := _whole(ds)) is not None:
+        return draw(figure, **where)
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
         message = "the run has no time series; omit series="
         raise ValueError(message)
@@ -194,96 +182,14 @@ def run(
     return _drawn("motion", _motion(ds, title, shown, endless=not repeats), where)
 
 
-def orbit(orbit: Orbit, **where: Unpack[Where]) -> "Figure":
+def orbit(orbit: "Orbit", **where: Unpack[Where]) -> "Figure":
     """An orbit: time series, phase portrait, harmonics, multipliers."""
-    ds = orbit.series
-    if ds is None:
-        message = "only an orbit found by nanotap.orbit has a time series"
-        raise ValueError(message)
-    title = f"period {orbit.period}, {orbit.stability}"
-    spectrum = orbit.spectrum().tip
-    # Harmonics are in the model's units, and the figure in those of the series.
-    size = np.abs(orbit.spectrum().tip).max()
-    in_si = ds.tip.attrs.get("units") == "m"
-    length = _case_of(ds)["physical"]["length_unit"] if in_si else 1.0
-    factor, unit = _prefixed(np.array([length * size]), "m") if in_si else (1.0, "")
-    facts = {
-        "motion": _motion(ds, title, orbit.period),
-        "harmonics": _points(spectrum.index, factor * length * spectrum),
-        "harmonics_unit": unit,
-        "multipliers": _points(orbit.multipliers.real, orbit.multipliers.imag),
-    }
-    return _drawn("orbit", facts, where)
+    return orbit.plot(**where)
 
 
-# Numbers of attractors drawn, and of drive periods of one that does not repeat.
-_MOST = 8
-_ENDLESS_PERIODS = 64
-
-
-def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
+def attractors(found: "Attractors", **where: Unpack[Where]) -> "Figure":
     """Phase portraits and strobe points of every attractor, in different colours."""
-    case = found.case
-    curves = []
-    shown = []
-    for one in list(found)[:_MOST]:
-        if one.period:
-            series = _signatures.orbit(case, period=one.period, state=one).series
-        else:
-            series = _signatures.simulate(
-                case,
-                state=one,
-                transient=0,
-                periods=_ENDLESS_PERIODS,
-                max_period=1,
-            )
-        assert series is not None
-        shown.append((one, series))
-    scales = (
-        (
-            _scale(*(series.tip for _, series in shown)),
-            _scale(*(s.tip_rate for _, s in shown)),
-        )
-        if shown
-        else ((1.0, ""), (1.0, ""))
-    )
-    for one, series in shown:
-        curves.append(
-            {
-                "name": f"{one.name} ({100 * one.fraction:.0f} %)",
-                "classification": one.classification,
-                "period": one.period,
-                **{
-                    k: _motion(series, "", 0.0, scales=scales)[k]
-                    for k in ("portrait", "strobe")
-                },
-            }
-        )
-    unstable = [point for one in found.unstable for point in _tips(case, one.states)]
-    (length, length_unit), (speed, speed_unit) = scales
-    physical = json.loads(case._core.document_at_setpoint).get("physical")
-    if physical and length_unit:
-        length *= physical["length_unit"]
-        speed *= physical["length_unit"] / physical["time_unit"]
-    facts = {
-        "axes": {
-            "beam": case.kind == "cantilever",
-            "length": length_unit,
-            "velocity": speed_unit,
-        },
-        "attractors": curves,
-        "unstable": [[length * tip, speed * rate] for tip, rate in unstable],
-    }
-    return _drawn("attractors", facts, where)
-
-
-def _tips(case: Case, states: Any) -> list[list[float]]:
-    """Tip deflection and rate of states: φ_j(1) = 2 (−1)^(j+1)."""
-    half = states.shape[1] // 2
-    if case.kind != "cantilever":
-        return _points(states[:, 0], states[:, half])
-    ends = 2.0 * (-1.0) ** np.arange(half)
-    return _points(states[:, :half] @ ends, states[:, half : 2 * half] @ ends)
+    return found.plot(**where)
 
 
 def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
@@ -439,10 +345,14 @@ def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
 
 
 def branch(
-    ds: "xr.Dataset", *, show: str = "tip_max", **where: Unpack[Where]
+    ds: "xr.Dataset", *, show: str | None = None, **where: Unpack[Where]
 ) -> "Figure":
     """Branches against the parameter, one colour per period, with their bifurcations, and the
-    bifurcation curves in two parameters, if they were traced."""
+    bifurcation curves in two parameters, if they were traced; `show` is an observable, by default
+    that of the terminal."""
+    if show is None and (figure := _whole(ds)) is not None:
+        return draw(figure, **where)
+    show = show or "tip_max"
     known = [str(n) for n, v in ds.data_vars.items() if v.dims == ("point",)]
     if show not in known or ds[show].dtype.kind not in "iuf":
         message = f"show: unknown variable `{show}`; available: {', '.join(known)}"
@@ -505,35 +415,14 @@ def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     }
 
 
-_PREFIXES = {
-    -18: "a",
-    -15: "f",
-    -12: "p",
-    -9: "n",
-    -6: "µ",
-    -3: "m",
-    0: "",
-    3: "k",
-    6: "M",
-}
-
-
-def _prefixed(values: Any, unit: str, natural: float = 0.0) -> tuple[float, str]:
-    """Factor of the values, and their unit in brackets with a suitable prefix."""
-    known = np.abs(values[np.isfinite(values)])
-    size = float(known.max()) if known.size else 0.0
-    if size <= 1e-9 * natural:
-        size = natural
-    power = int(np.clip(3 * np.floor(np.log10(size) / 3), -18, 6)) if size > 0 else 0
-    return 10.0**-power, f" ({_PREFIXES[power]}{unit})"
-
-
 def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     """Amplitude, phase, dissipated energy and peak force against distance, approach and retract.
 
     Under frequency modulation: frequency shift, drive, dissipated energy, and the force from
     the shifts.
     """
+    if (figure := _whole(ds)) is not None:
+        return draw(figure, **where)
     distance = ds.zc if "zc" in ds.dims else ds[ds.attrs["parameter"]]
     in_si = distance.name == "zc"
     rows = [
@@ -565,9 +454,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
             # The work of the force over the amplitude: less is rounding.
             work = float(np.nanmax(np.abs(ds.first_harmonic * ds.peak_force)))
             natural = work / _ELECTRONVOLT if in_si else work
-        scale, named = _scale(values)
-        if natural and in_si:
-            scale, named = _prefixed(values.values, "eV", natural)
+        scale, named = _scale(values, natural=natural or 0.0)
 
         def curve(
             way: str,
@@ -648,87 +535,96 @@ def _point_of(
     return motion["zc"], value
 
 
-def section(found: Lyapunov, **where: Unpack[Where]) -> "Figure":
+def section(found: "Lyapunov", **where: Unpack[Where]) -> "Figure":
     """A Poincaré section, and the exponents with their errors."""
-    cut = found.section
-    (length, length_unit), (speed, speed_unit) = _scale(cut.tip), _scale(cut.tip_rate)
-    impact, impact_unit = _scale(cut.gap_rate)
-    phases = np.unique(np.round(cut.phase.values, 9))
-    if len(phases) <= 1:
-        at: float | None = float(phases[0]) / 360 if len(phases) else 0.0
-        points = _points(length * cut.tip, speed * cut.tip_rate)
-    else:
-        at, points = None, _points(cut.phase, -impact * cut.gap_rate)
-    facts = {
-        "axes": {
-            "beam": _is_beam(cut),
-            "length": length_unit,
-            "velocity": speed_unit if at is not None else impact_unit,
-        },
-        "phase": at,
-        "points": points,
-        "exponents": found.exponents.tolist(),
-        "errors": np.nan_to_num(found.errors).tolist(),
-    }
-    return _drawn("section", facts, where)
+    return found.plot(**where)
 
 
-def fit(found: Fit, **where: Unpack[Where]) -> "Figure":
+def fit(found: "Fit", **where: Unpack[Where]) -> "Figure":
     """Measured curves, the fit through them, and the residuals."""
-    return _drawn("fit", found.to_dict(), where)
+    return found.plot(**where)
 
 
-def reconstruct(found: Reconstruction, **where: Unpack[Where]) -> "Figure":
+def reconstruct(found: "Reconstruction", **where: Unpack[Where]) -> "Figure":
     """Reconstructed force and dissipation against distance."""
-    return _drawn("reconstruct", found.to_dict(), where)
+    return found.plot(**where)
 
 
-def modes(found: Modes, **where: Unpack[Where]) -> "Figure":
+def modes(found: "Modes", **where: Unpack[Where]) -> "Figure":
     """The mode shapes of the bare beam."""
-    return _drawn("modes", {"modes": found.modes}, where)
+    return found.plot(**where)
 
 
-def convergence(found: Convergence, **where: Unpack[Where]) -> "Figure":
+def convergence(found: "Convergence", **where: Unpack[Where]) -> "Figure":
     """Change of the tip deflection against the number of modes."""
-    facts = {
-        "modes": list(found.modes),
-        "difference": [float(d) if np.isfinite(d) else None for d in found.difference],
-        "tolerance": found.tolerance,
-        "enough": found.enough,
+    return found.plot(**where)
+
+
+def scan(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
+    """A line or an image: height, amplitude error, phase, peak force."""
+    if (figure := _whole(ds)) is not None:
+        return draw(figure, **where)
+    facts: dict[str, Any] = {}
+    for name, value in ds.attrs.items():
+        key = "mode" if name == "scan_mode" else name
+        facts[key] = _loaded(value)
+    channels = [str(n) for n, v in ds.data_vars.items() if v.dims[-1:] == ("x",)]
+    for way in map(str, ds.direction.values):
+        rows = ds.sel(direction=way)
+        facts[way] = {name: _cells(rows[name].values) for name in channels}
+    listed = {
+        str(name): _cells(v.values)
+        for name, v in ds.variables.items()
+        if v.dims == ("k",)
     }
-    return _drawn("convergence", facts, where)
+    columns = {name.removeprefix("period_"): cells for name, cells in listed.items()}
+    facts["periods"] = [
+        dict(zip(columns, row, strict=True))
+        for row in zip(*columns.values(), strict=True)
+    ]
+    return _drawn("scan", facts, where)
+
+
+def _loaded(value: Any) -> Any:
+    """An attribute of a Dataset, which is JSON unless it is a word or a number."""
+    if not isinstance(value, str) or value[:1] not in "[{tfn":
+        return np.asarray(value).tolist()
+    try:
+        return json.loads(value)
+    except json.JSONDecodeError:
+        return value
+
+
+def _cells(values: Any) -> Any:
+    """Values as in a document, without NaN."""
+    if values.dtype.kind != "f":
+        return values.tolist()
+    cells = values.astype(object)
+    cells[np.isnan(values)] = None
+    return cells.tolist()
 
 
 def show(result: Any, **options: Any) -> "Figure":
     """The figure of any result."""
-    if isinstance(result, Report):
+    if isinstance(result, Answered):
         return result.plot(**options)
     draw_it: Callable[..., Figure]
-    for kind, draw_it in _FIGURES.items():
-        if isinstance(result, kind):
-            return draw_it(result, **options)
     for name, draw_it in _FIGURES_BY_VARIABLE.items():
         if name in getattr(result, "variables", ()):
             return draw_it(result, **options)
+    if "figure" in getattr(result, "attrs", ()):
+        return draw(result.attrs["figure"], **options)
     message = f"there is no figure for a {type(result).__name__}"
     raise TypeError(message)
 
 
-_FIGURES: dict[type, Callable[..., "Figure"]] = {
-    Orbit: orbit,
-    Attractors: attractors,
-    Lyapunov: section,
-    Modes: modes,
-    Convergence: convergence,
-    Fit: fit,
-    Reconstruction: reconstruct,
-}
 # The first of these that a Dataset has determines its type.
 _FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {
     "branch": branch,
     "attractor": basin,
     "period_max": sweep,
     "way": approach,
+    "surface": scan,
     "tau": run,
     "failure": orbits,
 }

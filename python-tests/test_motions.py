@@ -135,7 +135,12 @@ def test_an_orbit_has_the_terminals_numbers(regular, tmp_path):
 def test_a_physical_orbit_is_told_in_si(physical):
     orbit = nanotap.orbit(physical)
     scale = physical.physical.length_unit
-    assert orbit.physical.amplitude == pytest.approx(orbit.amplitude * scale, rel=1e-12)
+    plain = orbit.to_dict()["amplitude"]
+    assert orbit.amplitude == orbit.physical.amplitude
+    assert orbit.amplitude == pytest.approx(plain * scale, rel=1e-12)
+    assert orbit.units["amplitude"] == "m" and orbit.first_harmonic == orbit.physical.A
+    model = nanotap.orbit(physical.with_(model_units=True))
+    assert model.amplitude == plain and model.units["amplitude"] == "g0"
     assert orbit.physical.frequency == pytest.approx(65.7e3, rel=1e-9)
     ds = nanotap.simulate(physical, periods=5)
     assert ds.physical_amplitude.attrs["units"] == "m"

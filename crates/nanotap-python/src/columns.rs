@@ -97,9 +97,6 @@ fn gather(
             // The evidence for a classification is a text.
             Value::String(_) if name == "evidence" => continue,
             Value::Object(energies) if name == "energy_balance" => {
-                if !before.is_empty() {
-                    continue;
-                }
                 let numbers = energies.values().map(|v| v.as_f64().unwrap_or(f64::NAN));
                 Entry::Row("energy", numbers.collect())
             }
@@ -108,7 +105,7 @@ fn gather(
                 continue;
             }
             // Values of another shape belong to single results.
-            Value::Array(_) if !before.is_empty() => continue,
+            Value::Array(_) if !before.is_empty() && !name.ends_with("_range") => continue,
             Value::Array(numbers) => {
                 let numbers: Option<Vec<f64>> = numbers.iter().map(Value::as_f64).collect();
                 let Some(numbers) = numbers else { continue };
@@ -122,8 +119,8 @@ fn gather(
                     "state"
                 };
                 // `state` is the dimension along which states lie.
-                let name = if name == "state" { "orbit_state" } else { name };
-                all.push((name.into(), Entry::Row(along, numbers)));
+                let full = if name == "state" { "orbit_state".into() } else { full };
+                all.push((full, Entry::Row(along, numbers)));
                 continue;
             }
             Value::Bool(flag) => Entry::Flag(*flag),

@@ -97,11 +97,10 @@ def _part(node: Mapping[str, Any]) -> str:
     return next((name.rsplit("/", 1)[-1] for name in names if name), "")
 
 
-def derivative_unit(name: str, *, physical: bool) -> str:
-    """The unit of the observable of a derivative, in SI or in the model's units."""
-    words = _GLOSSARY["physical" if physical else "model"]
-    entry = words.get(name_in_si(name) if physical else name, {})
-    return str(entry.get("unit", ""))
+def observable_unit(name: str, in_si: bool) -> str:
+    """The unit of an observable in SI or in the model's units; empty if it is none."""
+    words = _GLOSSARY["physical" if in_si else "model"]
+    return str(words.get(name_in_si(name) if in_si else name, {}).get("unit", ""))
 
 
 @lru_cache(maxsize=64)

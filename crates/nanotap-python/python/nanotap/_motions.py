@@ -46,9 +46,9 @@ def modes(case: Case, options: Mapping[str, Any]) -> Modes:
     table.xi.attrs.update(
         long_name="position along the beam, clamp 0 to tip 1", units="L"
     )
-    document = _document(core.document)
-    answer = Answer(core)
-    return Modes.of(document, scales(case), "modes", shapes=table, _answer=answer)
+    document = json.loads(core.document)
+    units, answer = scales(case, document.pop("case")), Answer(core)
+    return Modes.of(document, units, "modes", shapes=table, _answer=answer)
 
 
 @stoppable()
@@ -109,16 +109,7 @@ def orbit(
         return answered(case, dataset(variables, coords, attributes))
 
     answer = Answer(core)
-    return Orbit.of(
-        document, scales(case), "orbit", made_series=series, _answer=answer
-    )
-
-
-def _document(text: str) -> dict[str, Any]:
-    """A document without the case and the version, which the caller has."""
-    document: dict[str, Any] = json.loads(text)
-    del document["case"], document["version"]
-    return document
+    return Orbit.of(document, scales(case), "orbit", made_series=series, _answer=answer)
 
 
 def words(names: Sequence[str]) -> "np.typing.NDArray[np.str_]":

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ._describe import derivative_unit, fields, name_in_si
+from ._describe import fields, name_in_si, observable_unit
 
 if TYPE_CHECKING:
     from ._si import Scales
@@ -92,18 +92,19 @@ class Record(Mapping[str, Any]):
     @property
     def units(self) -> dict[str, str]:
         """The units of the entries that have one."""
-        found = {}
-        for name in self._entries:
-            unit = self._field(name)[0]
-            if self._schema is not None and self._schema[1] == "Derivative":
-                unit = derivative_unit(name, physical=self._scales is not None)
-                key = self._entries.get("unit")
-                unit = f"{unit}/({key})" if unit and key else unit
-            if self._scales is not None and name not in _STATES:
-                unit = self._scales.of(unit)[1]
-            if unit:
-                found[name] = unit
-        return found
+        found = {name: self._unit(name) for name in self._entries}
+        return {name: unit for name, unit in found.items() if unit}
+
+    def _unit(self, name: str) -> str:
+        unit = self._field(name)[0]
+        in_si = self._scales is not None and name not in _STATES
+        if self._schema is not None and self._schema[1] == "Derivative":
+            unit, key = observable_unit(name, in_si), self._entries.get("unit")
+            return f"{unit}/({key})" if unit and key else unit
+        if in_si and self._scales is not None:
+            known = name in (self._entries.get("physical") or ())
+            unit = (known and observable_unit(name, True)) or self._scales.of(unit)[1]
+        return unit
 
     def _wrapped(self, name: str, value: Any, scales: "Scales | None") -> Any:
         # JSON has no other types, and testing for a Mapping is slow.

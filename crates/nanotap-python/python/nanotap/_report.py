@@ -125,9 +125,7 @@ class Report(Answered, Record):
 
     __slots__ = ("_answer",)
 
-    def __init__(
-        self, entries: Mapping[str, Any], answer: Answer, *about: Any
-    ) -> None:
+    def __init__(self, entries: Mapping[str, Any], answer: Answer, *about: Any) -> None:
         super().__init__(entries, *about)
         self._answer = answer
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
 
 class Scales:
-    """The model's units of a physical case in SI."""
+    """The model's units of a physical case in SI, from the document of the case."""
 
-    def __init__(self, case: "Case | None", known: dict[str, Any] | None = None) -> None:
-        self._case = case
-        if known is not None:
-            self._factors = known
+    def __init__(self, document: Mapping[str, Any] | Callable[[], str]) -> None:
+        self._document = document
 
     @cached_property
     def _factors(self) -> dict[str, tuple[float, str]]:
-        assert self._case is not None
-        return _factors(json.loads(self._case._core.document_at_setpoint))
+        document = self._document
+        case = json.loads(document()) if callable(document) else document
+        # A case whose distance is open has no units, nor has its report numbers in them.
+        return _factors(case) if case.get("physical") else {}
 
     def of(self, unit: str) -> tuple[float, str]:
         """Factor of numbers in one of the model's units, and their unit in SI; 1 and the unit itself
@@ -33,12 +33,17 @@ class Scales:
         return self._factors.get(unit, (1.0, unit)) if unit else (1.0, "")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Scales, (None, self._factors)
+        document = self._document
+        case = json.loads(document()) if callable(document) else document
+        return Scales, ({"physical": case.get("physical")},)
 
 
-def scales(case: "Case") -> Scales | None:
-    """The units of a case whose results are in SI."""
-    return Scales(case) if case.is_physical and not case._core.model_units else None
+def scales(case: "Case", document: Mapping[str, Any] | None = None) -> Scales | None:
+    """The units of a case, by its document as it was studied, if its results are in SI."""
+    if not case.is_physical or case._core.model_units:
+        return None
+    core = case._core
+    return Scales(document or (lambda: core.document_at_setpoint))
 
 
 def _factors(case: Mapping[str, Any]) -> dict[str, tuple[float, str]]:

@@ -11,7 +11,7 @@ from ._arguments import Progress
 from ._case import Case, Path
 from ._describe import case_attributes, declared, describe
 from ._interrupt import Interrupted, part_of, stoppable
-from ._motions import _cased, _document, words
+from ._motions import _cased, words
 from ._progress import bar
 from ._record import Record, plain
 from ._report import Answer, Report
@@ -23,7 +23,7 @@ from ._results import (
     Paper,
     Reconstruction,
 )
-from ._si import answered, scales
+from ._si import Scales, answered, scales
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -40,8 +40,9 @@ def _run(
     options: Mapping[str, Any],
     threads: int | None = None,
     progress: Progress = None,
-) -> tuple[dict[str, Any], Answer, bool]:
-    """The document of a study, its tables and figure, and whether it was stopped by Ctrl-C."""
+) -> tuple[dict[str, Any], Answer, Scales | None, bool]:
+    """The document of a study, its tables and figure, the units in which it is shown, and whether it
+    was stopped by Ctrl-C."""
     core = _cased(case)._core
     request = _arguments.request(name, options)
     many = _arguments.optional_count("threads", threads)
@@ -49,7 +50,10 @@ def _run(
         report, interrupted = _nanotap.study(
             name, core, request, threads=many, progress=show
         )
-    return _document(report.document), Answer(report), interrupted
+    document = json.loads(report.document)
+    units = scales(case, document.pop("case"))
+    del document["version"]
+    return document, Answer(report), units, interrupted
 
 
 @stoppable()
@@ -57,8 +61,10 @@ def attractors(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Attractors:
     """A census; the finished part if Ctrl-C stopped it."""
-    document, answer, interrupted = _run("attractors", case, options, threads, progress)
-    record = Record(document, scales(case), ("attractors", ""))
+    document, answer, units, interrupted = _run(
+        "attractors", case, options, threads, progress
+    )
+    record = Record(document, units, ("attractors", ""))
     found = Attractors(case, record, answer)
     if interrupted:
         message = "stopped before all starts were finished: the fractions refer to the finished ones"
@@ -80,12 +86,16 @@ def branch(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "StudyDataset":
     """Branches over `point`; the finished part if Ctrl-C stopped it."""
-    document, answer, interrupted = _run("branch", case, options, threads, progress)
-    ds = _branch_dataset(case, document).answered_by(answer)
+    document, answer, units, interrupted = _run(
+        "branch", case, options, threads, progress
+    )
+    ds = _branch_dataset(case, document, units).answered_by(answer)
     return _finished(ds, interrupted)
 
 
-def _branch_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
+def _branch_dataset(
+    case: Case, report: dict[str, Any], units: Scales | None
+) -> "StudyDataset":
     from ._study_dataset import StudyDataset
 
     name = report["parameter"]
@@ -148,7 +158,7 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
     ds.attrs.update(
         parameter=name,
         parameter_symbol=symbols.get(name, name),
-        **_shown(case, "branch", report, ("branches", "failures")),
+        **_shown(units, "branch", report, ("branches", "failures")),
     )
     unit = report.get("parameter_unit")
     if unit:
@@ -167,10 +177,10 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
 
 
 def _shown(
-    case: Case, study: str, report: Mapping[str, Any], names: Iterable[str]
+    units: Scales | None, study: str, report: Mapping[str, Any], names: Iterable[str]
 ) -> dict[str, str]:
     """Entries of a report as attributes: JSON, in SI if the other numbers are."""
-    record = Record(report, scales(case), (study, ""))
+    record = Record(report, units, (study, ""))
     return {name: json.dumps(plain(record[name])) for name in names if name in record}
 
 
@@ -219,19 +229,23 @@ def approach(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "StudyDataset":
     """An approach curve over `way` and distance; the finished part if Ctrl-C stopped it."""
-    document, answer, interrupted = _run("approach", case, options, threads, progress)
+    document, answer, units, interrupted = _run(
+        "approach", case, options, threads, progress
+    )
     if interrupted and not document["table"]:
         raise part_of(None, finished=False)
-    ds = _approach_dataset(case, document).answered_by(answer)
+    ds = _approach_dataset(case, document, units).answered_by(answer)
     return _finished(ds, interrupted)
 
 
-def _approach_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
+def _approach_dataset(
+    case: Case, report: dict[str, Any], units: Scales | None
+) -> "StudyDataset":
     from ._study_dataset import StudyDataset
 
     name = report["parameter"]
     kept = ("hysteresis", "jumps", "modulation")
-    shown = _shown(case, "approach", report, kept)
+    shown = _shown(units, "approach", report, kept)
     ways = ["approach", "retract"]
     rows: dict[tuple[str, float], dict[str, Any]] = {}
     for entry in report["table"]:
@@ -314,7 +328,9 @@ def scan(
 ) -> "StudyDataset":
     """Height, error, phase … over direction, line and pixel; the finished part if Ctrl-C stopped it."""
     if out is None and chunk == "1/1" and client is None:
-        document, answer, interrupted = _run("scan", case, options, threads, progress)
+        document, answer, _, interrupted = _run(
+            "scan", case, options, threads, progress
+        )
         found = _scan_dataset(case, document).answered_by(answer)
         return _finished(found, interrupted, part=bool(found.sizes["y"]))
     plan = ("scan", case, _arguments.request("scan", options))
@@ -408,9 +424,10 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     )
     cut.phase.attrs.update(long_name="drive phase", units="degrees")
     cut.gap_rate.attrs.update(long_name="rate of the gap", units="g0 sqrt(EI/(m L^4))")
+    document = json.loads(core.document)
     return Lyapunov.of(
-        _document(core.document),
-        scales(case),
+        document,
+        scales(case, document.pop("case")),
         "lyapunov",
         section=answered(case, describe(cut)),
         _answer=Answer(core),
@@ -420,8 +437,8 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
 @stoppable()
 def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:
     """The motion for each number of modes."""
-    document, answer, interrupted = _run("convergence", case, options)
-    found = Convergence.of(document, scales(case), "convergence", _answer=answer)
+    document, answer, units, interrupted = _run("convergence", case, options)
+    found = Convergence.of(document, units, "convergence", _answer=answer)
     return _finished(found, interrupted)
 
 
@@ -435,8 +452,8 @@ def document(
 ) -> Report:
     """The report of a study: its document, with the names of the terminal's JSON, its tables and its
     figure."""
-    report, answer, interrupted = _run(name, case, options, threads, progress)
-    found = Report(report, answer, scales(case), (name, ""))
+    report, answer, units, interrupted = _run(name, case, options, threads, progress)
+    found = Report(report, answer, units, (name, ""))
     return _finished(found, interrupted)
 
 
@@ -454,8 +471,8 @@ def fit(
         if options[name] is not None
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
-    document, answer, interrupted = _run("fit", case, asked, threads, progress)
-    return _finished(Fit(document, answer), interrupted)
+    document, answer, units, interrupted = _run("fit", case, asked, threads, progress)
+    return _finished(Fit(document, answer, units, ("fit", "")), interrupted)
 
 
 @stoppable()
@@ -536,10 +553,11 @@ def reconstruct(
         if options[name] is not None
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
-    document, answer, interrupted = _run(
+    document, answer, units, interrupted = _run(
         "reconstruct", case, asked, threads, progress
     )
-    return _finished(Reconstruction(document, answer), interrupted)
+    found = Reconstruction(document, answer, units, ("reconstruct", ""))
+    return _finished(found, interrupted)
 
 
 def paper(

@@ -96,12 +96,11 @@ def _terminal_file(result: Any) -> str | None:
     """The text of the terminal's file, if the result has one."""
     if (answer := getattr(result, "_answer", None)) is not None:
         return str(answer.csv)
-    for name in ("classification", "attractor", "result"):
-        if name in getattr(result, "variables", ()) and "path" not in result.dims:
-            dims = tuple(map(str, result[name].dims))
-            if dims and any("flag_meanings" in v.attrs for v in result.values()):
-                return _grid(result, dims)
-    return None
+    if "kind" not in getattr(result, "attrs", ()):
+        return None
+    named = ("classification", "attractor", "result")
+    main = next((name for name in named if name in result), None)
+    return None if main is None else _grid(result, tuple(map(str, result[main].dims)))
 
 
 # What Python adds to the variables of a store.
@@ -125,7 +124,9 @@ def _grid(ds: "xr.Dataset", dims: tuple[str, ...]) -> str:
     columns = []
     for name, variable in along + measured:
         cells = variable.broadcast_like(like).transpose(*dims).values.ravel()
-        columns.append((str(name), str(variable.attrs.get("units", "")), cells.tolist()))
+        columns.append(
+            (str(name), str(variable.attrs.get("units", "")), cells.tolist())
+        )
     return _nanotap.csv(columns)
 
 

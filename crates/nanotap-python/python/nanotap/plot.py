@@ -161,11 +161,11 @@ def run(
     ds: "xr.Dataset", *, periods: float | None = None, **where: Unpack[Where]
 ) -> "Figure":
     """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
-    if periods is None and (figure := _whole(ds)) is not None:
-        return draw(figure, **where)
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
         message = "the run has no time series; omit series="
         raise ValueError(message)
+    if periods is None and (figure := _whole(ds)) is not None:
+        return draw(figure, **where)
     recorded = float(ds.tau[-1]) / _period_of(ds)
     named = ds.get("period", ds.get("apparent_period"))
     period = np.nan if named is None else float(named)

@@ -1,8 +1,6 @@
 """Cases: their values, changes to them, and error messages."""
 
 import json
-import os
-import pathlib
 import pickle
 import subprocess
 
@@ -11,9 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from conftest import PHYSICAL
+from program import PROGRAM, ROOT
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
 GIVEN = {
     "modes": 3,
     "alpha1": 0.1,

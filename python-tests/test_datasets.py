@@ -5,19 +5,16 @@ variable NANOTAP names the program (otherwise the release build of this checkout
 """
 
 import json
-import os
-import pathlib
 import subprocess
 import warnings
 
 import pytest
+from program import PROGRAM, ROOT
 
 np = pytest.importorskip("numpy")
 xr = pytest.importorskip("xarray")
 zarr = pytest.importorskip("zarr")
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
 CASE = """
 [model]
 modes = 3

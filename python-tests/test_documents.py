@@ -2,20 +2,13 @@
 
 import functools
 import json
-import os
-import pathlib
 import re
 import subprocess
 
 import jsonschema
 import pytest
+from program import PROGRAM, ROOT
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAM = str(
-    pathlib.Path(
-        os.environ.get("NANOTAP", ROOT / "target" / "release" / "nanotap")
-    ).absolute()
-)
 FOLDERS = ["docs/cases", "crates/nanotap-explorer/cases"]
 CASES = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("*.toml"))
 #: Cases on which a single motion takes long.

@@ -1,8 +1,6 @@
 """Runs, orbits, censuses: the terminal's numbers as Python objects."""
 
 import json
-import os
-import pathlib
 import pickle
 import subprocess
 
@@ -11,9 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import PHYSICAL
-
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
+from program import PROGRAM, ROOT
 
 
 def terminal(tmp_path, case, *arguments):

@@ -14,9 +14,7 @@ import nanotap
 import numpy as np
 import pytest
 import xarray as xr
-
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
+from program import PROGRAM
 
 
 def assert_same(here, there):

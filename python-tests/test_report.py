@@ -1,62 +1,117 @@
-"""Reports of studies: their tables are those of the terminal's CSV files, in SI with units."""
+"""Results of every study: their tables are those of the terminal's CSV files, in SI with units, and
+their figures are drawn from what was saved."""
 
 import csv
-import os
+import math
 import pickle
 import subprocess
-from pathlib import Path
 
 import nanotap
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.figure import Figure
+from program import PROGRAM, ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
-PROGRAM = os.environ.get("NANOTAP", str(ROOT / "target" / "release" / "nanotap"))
 CASES = ROOT / "docs" / "cases"
+REGULAR = {"omega": 3}
 
-# Study, case, options, and whether it has a figure.
+# Function, case, keys, options, and whether there is a figure.
 STUDIES = [
-    ("fm", "fm-lever.toml", {"points": 3}, True),
-    ("force_curve", "force-curve-jkr.toml", {"points": 20}, True),
-    ("noise", "dforce-dmt.toml", {}, False),
-    ("contact_laws", "dforce-dmt.toml", {}, True),
-    ("bimodal", "bimodal-polymer.toml", {"points": 3}, True),
+    ("modes", "paper.toml", REGULAR, {}, True),
+    ("modes", "stiff-lever.toml", {}, {"points": 5}, True),
+    ("simulate", "paper.toml", REGULAR, {"periods": 3}, True),
+    ("simulate", "stiff-lever.toml", {}, {"periods": 120, "transient": 3}, True),
+    ("simulate", "stiff-lever.toml", {}, {"periods": 2, "method": "rk4"}, True),
+    ("orbit", "paper.toml", REGULAR, {}, True),
+    ("orbit", "stiff-lever.toml", {}, {"resolution": 50}, True),
+    ("attractors", "paper.toml", REGULAR, {"starts": 6}, True),
+    ("attractors", "stiff-lever.toml", {}, {"starts": 4}, True),
+    ("branch", "paper.toml", {}, {"parameter": "omega", "from_": 3, "to": 3.05}, True),
+    (
+        "branch",
+        "stiff-lever.toml",
+        {},
+        {"parameter": "gap.tip", "from_": "15 nm", "to": "14 nm"},
+        True,
+    ),
+    ("approach", "stiff-lever.toml", {}, {"points": 4}, True),
+    ("approach", "paper.toml", {"alpha5": 0}, {"points": 4}, True),
+    ("fm", "fm-lever.toml", {}, {"points": 3}, True),
+    ("force_curve", "force-curve-jkr.toml", {}, {"points": 20}, True),
+    ("lyapunov", "paper.toml", REGULAR, {"periods": 60, "transient": 20}, True),
+    ("lyapunov", "stiff-lever.toml", {}, {"periods": 60, "transient": 20}, True),
+    ("convergence", "paper.toml", REGULAR, {"largest": 2}, True),
+    ("convergence", "stiff-lever.toml", {}, {"largest": 2}, True),
+    ("noise", "dforce-dmt.toml", {}, {}, False),
+    ("contact_laws", "dforce-dmt.toml", {}, {}, True),
+    ("bimodal", "bimodal-polymer.toml", {}, {"points": 3}, True),
+    ("scan", "scan-step.toml", {}, {"lines": 1, "size": "20 nm"}, True),
+    ("scan", "scan-particle.toml", {}, {"lines": 3, "pixels": 12}, True),
+    ("sweep", "paper.toml", {}, {"over": "omega=2.9:3.1:6", "starts": 2}, True),
+    ("sweep", "stiff-lever.toml", {}, {"over": "gap.tip=14nm:15nm:3"}, True),
+    (
+        "window",
+        "paper.toml",
+        REGULAR,
+        {"over": ["omega=3:3.1:2", "alpha4=20:21:2"], "starts": 2},
+        True,
+    ),
+    (
+        "basin",
+        "paper.toml",
+        REGULAR,
+        {"x": "a1=-1:1:3", "y": "v1=-1:1:3", "starts": 4},
+        True,
+    ),
 ]
 
 
-@pytest.fixture(scope="module", params=STUDIES, ids=lambda study: study[0])
+@pytest.fixture(scope="module", params=STUDIES, ids=lambda study: "-".join(study[:2]))
 def study(request, tmp_path_factory):
-    """A report, the heads and rows of the CSV file that the terminal writes, and whether there is a
-    figure.
-    """
-    name, file, options, has_figure = request.param
-    case = nanotap.Case.from_file(CASES / file)
-    report = getattr(nanotap, name)(case, **options, progress=False)
+    """A result, the CSV file that the terminal writes, and whether there is a figure."""
+    name, file, keys, options, has_figure = request.param
+    case = nanotap.Case.from_file(CASES / file, **keys)
+    function = getattr(nanotap, name)
+    takes = function.__code__.co_varnames
+    silent = {"progress": False} if "progress" in takes else {}
+    result = function(case, **options, **silent)
+    words = [f"--set={key}={value}" for key, value in keys.items()]
+    for key, value in options.items():
+        flag = key.strip("_").replace("_", "-")
+        listed = value if isinstance(value, list) else [value]
+        words += [f"--{flag}={one}" for one in listed]
     out = tmp_path_factory.mktemp(name) / "table.csv"
-    words = [f"--{key.replace('_', '-')}={value}" for key, value in options.items()]
     command = [PROGRAM, name.replace("_", "-"), str(CASES / file), *words]
     subprocess.run(
         [*command, "--out", str(out), "--quiet"], check=True, capture_output=True
     )
-    with out.open() as lines:
-        heads, *rows = csv.reader(lines)
-    return report, heads, rows, has_figure
+    return result, out.read_bytes(), has_figure
+
+
+def test_the_csv_file_is_the_terminals(study, tmp_path):
+    result, written, _ = study
+    nanotap.export.csv(result, tmp_path / "table.csv")
+    assert (tmp_path / "table.csv").read_bytes() == written
 
 
 def test_the_first_table_is_the_terminals_file(study):
-    report, heads, rows, _ = study
-    table = report.to_dataframe()
+    result, written, _ = study
+    if "kind" in getattr(result, "attrs", ()):
+        pytest.skip("a dataset has the rows of its grid")
+    heads, *rows = csv.reader(written.decode().splitlines())
+    name, table = next(iter(result.tables.items()))
+    assert result.to_dataframe(name).equals(table)
     assert len(table) == len(rows) > 0
-    written: dict[str, tuple[str, list[str]]] = {}
+    columns: dict[str, tuple[str, list[str]]] = {}
     for head, column in zip(heads, zip(*rows, strict=True), strict=True):
-        name, _, unit = head.removesuffix(")").partition(" (")
+        key, _, unit = head.removesuffix(")").partition(" (")
         # Energies are in J and again in eV.
-        written.setdefault(name, (unit, list(column)))
-    assert list(table.columns) == list(written)
-    for name, (unit, texts) in written.items():
-        assert table.attrs["units"][name] in {unit, ""}
-        for value, text in zip(table[name], texts, strict=True):
+        columns.setdefault(key, (unit, list(column)))
+    assert list(table.columns) == list(columns)
+    for key, (unit, texts) in columns.items():
+        assert table.attrs["units"][key] in {unit, ""}
+        for value, text in zip(table[key], texts, strict=True):
             if isinstance(value, str):
                 assert value == text
             elif text == "":
@@ -65,30 +120,100 @@ def test_the_first_table_is_the_terminals_file(study):
                 assert value == float(text)
 
 
-def test_all_tables_are_a_dataset_with_units(study, tmp_path):
-    report, *_ = study
-    ds = report.ds
-    assert set(ds.dims) == set(report.tables)
-    for name, variable in ds.data_vars.items():
-        is_text = variable.dtype.kind in "UO"
-        assert is_text or {"units", "long_name"} <= set(variable.attrs), name
-    ds.to_netcdf(tmp_path / "report.nc")
-    nanotap.export.csv(report, tmp_path / "table.csv")
-    assert (tmp_path / "table.csv").read_text().count("\n") == len(
-        report.to_dataframe()
-    ) + 1
+def test_every_variable_has_a_unit_and_a_name(study):
+    for name, variable in study[0].ds.variables.items():
+        if name in {"state", "energy", "direction", "way", "part"}:
+            continue
+        assert variable.attrs.get("long_name"), name
+        assert variable.dtype.kind in "UO" or variable.attrs.get("units"), name
 
 
-def test_a_report_draws_its_figure_and_is_pickled(study):
-    report, _, _, has_figure = study
-    if has_figure:
-        assert isinstance(report.plot(), Figure)
-        assert isinstance(nanotap.plot.show(report), Figure)
-    else:
+def test_what_was_saved_is_drawn(study, tmp_path):
+    result, _, has_figure = study
+    if not has_figure:
         with pytest.raises(TypeError, match="no figure"):
-            report.plot()
-    again = pickle.loads(pickle.dumps(report))
-    assert again == report
-    assert again.to_dataframe().equals(report.to_dataframe())
+            result.plot()
+        return
+    assert isinstance(result.plot(), Figure)
+    assert isinstance(nanotap.plot.show(result), Figure)
+    result.ds.to_netcdf(tmp_path / "saved.nc")
+    with xr.open_dataset(tmp_path / "saved.nc") as saved:
+        assert isinstance(nanotap.plot.show(saved), Figure)
+
+
+def test_a_result_is_pickled_with_its_tables(study):
+    result = study[0]
+    again = pickle.loads(pickle.dumps(result))
+    for name, table in result.tables.items():
+        assert again.tables[name].equals(table)
+    assert type(again.plot) is type(result.plot)
+
+
+def test_a_table_that_is_not_there_is_refused():
+    case = nanotap.Case.from_file(CASES / "dforce-dmt.toml")
     with pytest.raises(KeyError, match="there is no table `x`"):
-        report.to_dataframe("x")
+        nanotap.noise(case).to_dataframe("x")
+
+
+def records(entries, path=""):
+    """All parts of a document, with where they are."""
+    yield path, entries
+    for name in entries:
+        found = entries[name]
+        for one in found if isinstance(found, list) else [found]:
+            if isinstance(one, nanotap.Record):
+                yield from records(one, f"{path}/{name}")
+
+
+# Of several units, or none.
+OF_STATES = {"state", "states", "start", "strobe", "mean"}
+MODEL = ("g0", "EI", "sqrt(")
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("orbit", {"derivatives": ["gap.tip"]}),
+        ("attractors", {"starts": 4}),
+        ("modes", {}),
+        ("convergence", {"largest": 2}),
+        ("contact_laws", {}),
+        ("noise", {}),
+        ("fm", {"points": 3, "from_": "25 nm", "to": "19 nm"}),
+    ],
+)
+def test_records_of_a_physical_case_are_in_si(name, options):
+    """Each number that the document has in SI, too, is that one; of no other does a unit remain that
+    is the model's."""
+    case = nanotap.Case.from_file(CASES / "stiff-lever.toml")
+    if name == "fm":
+        case = nanotap.Case.from_file(CASES / "fm-lever.toml")
+    result = getattr(nanotap, name)(case, **options)
+    document = result if isinstance(result, nanotap.Record) else result.document
+    compared = 0
+    for path, part in records(document):
+        for entry, unit in part.units.items():
+            assert entry in OF_STATES or not unit.startswith(MODEL), (path, entry, unit)
+        physical = part.to_dict().get("physical") or {}
+        for entry, value in physical.items():
+            if entry in part and entry not in OF_STATES and isinstance(value, float):
+                assert part[entry] == value, (path, entry)
+                compared += 1
+    assert compared > 0 or name == "noise"
+    assert document.to_dict() != {} and math.isfinite(len(document))
+
+
+def test_derivatives_say_their_unit():
+    case = nanotap.Case.from_file(CASES / "stiff-lever.toml")
+    found = nanotap.orbit(case, derivatives=["gap.tip", "sample.loss_tangent"])
+    by_distance = found.derivatives["gap.tip"]
+    assert by_distance.amplitude == by_distance.physical.amplitude
+    assert by_distance.units["amplitude"] == "m/m"
+    assert by_distance.units["phase"] == "degree/m"
+    step = 1e-13
+    ends = [
+        nanotap.orbit(case.with_(**{"gap.tip": case.physical.tip_gap + sign * step}))
+        for sign in (-1, 1)
+    ]
+    slope = (ends[1].amplitude - ends[0].amplitude) / (2 * step)
+    assert by_distance.amplitude == pytest.approx(slope, rel=1e-4)

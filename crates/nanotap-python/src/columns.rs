@@ -119,7 +119,11 @@ fn gather(
                     "state"
                 };
                 // `state` is the dimension along which states lie.
-                let full = if name == "state" { "orbit_state".into() } else { full };
+                let full = if name == "state" {
+                    "orbit_state".into()
+                } else {
+                    full
+                };
                 all.push((full, Entry::Row(along, numbers)));
                 continue;
             }

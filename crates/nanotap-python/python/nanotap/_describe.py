@@ -77,12 +77,17 @@ def fields(study: str, part: str) -> dict[str, tuple[str, str]]:
     """The entries of a part of a report (the report itself without a name): the unit of each and
     the part that describes it, as Rust declares them; empty where there is none."""
     whole = _schema(study)
-    node = whole["$defs"].get(part, {}) if part else whole
+    name, *inside = part.split("/")
+    node = whole["$defs"].get(name, {}) if name else whole
+    for entry in inside:
+        node = node["properties"][entry]
     found: dict[str, tuple[str, str]] = {}
     for choice in node.get("anyOf", ()):
         found |= fields(study, _part(choice)) if _part(choice) else {}
     for name, one in node.get("properties", {}).items():
-        found[name] = (one.get("x-unit", ""), _part(one))
+        inner = f"{part}/{name}" if "properties" in one else _part(one)
+        # Energies have the unit of their balance.
+        found[name] = (one.get("x-unit", node.get("x-unit", "")), inner)
     return found
 
 

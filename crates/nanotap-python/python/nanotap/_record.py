@@ -73,7 +73,8 @@ class Record(Mapping[str, Any]):
             for ending in _IN_SI:
                 if name + ending in self._entries:
                     return self._entries[name + ending], None
-        factor, _ = scales.of(self._field(name)[0])
+        unit = fields(*self._schema).get(name, ("", ""))[0] if self._schema else ""
+        factor, _ = scales.of(unit)
         if factor != 1 and isinstance(value, float):
             return factor * value, None
         if factor != 1 and isinstance(value, list):
@@ -81,13 +82,23 @@ class Record(Mapping[str, Any]):
         return value, scales
 
     def _field(self, name: str) -> tuple[str, str]:
-        """The declared unit of an entry, and the part of the schema that describes it."""
+        """The declared unit of an entry as it is shown, and the part of the schema that describes
+        it."""
         if self._schema is None:
             return "", ""
         study, part = self._schema
         if part.startswith("*"):
             return "", part[1:]
-        return fields(study, part).get(name, ("", ""))
+        known = fields(study, part)
+        unit, inner = known.get(name, ("", ""))
+        if self._scales is None or name in _STATES:
+            return unit, inner
+        physical = self._entries.get("physical")
+        if isinstance(physical, dict) and name_in_si(name) in physical:
+            in_si = fields(study, known["physical"][1]).get(name_in_si(name))
+            if in_si is not None:
+                return in_si
+        return self._scales.of(unit)[1], inner
 
     @property
     def units(self) -> dict[str, str]:
@@ -96,15 +107,12 @@ class Record(Mapping[str, Any]):
         return {name: unit for name, unit in found.items() if unit}
 
     def _unit(self, name: str) -> str:
-        unit = self._field(name)[0]
-        in_si = self._scales is not None and name not in _STATES
         if self._schema is not None and self._schema[1] == "Derivative":
-            unit, key = observable_unit(name, in_si), self._entries.get("unit")
-            return f"{unit}/({key})" if unit and key else unit
-        if in_si and self._scales is not None:
-            known = name in (self._entries.get("physical") or ())
-            unit = (known and observable_unit(name, True)) or self._scales.of(unit)[1]
-        return unit
+            unit = observable_unit(name, self._scales is not None)
+            key = self._entries.get("unit")
+            of_one = f"({key})" if key and "/" in key else key
+            return f"{unit}/{of_one}" if unit and of_one else unit
+        return self._field(name)[0]
 
     def _wrapped(self, name: str, value: Any, scales: "Scales | None") -> Any:
         # JSON has no other types, and testing for a Mapping is slow.

@@ -25,6 +25,7 @@ pub struct EnergyBalance<D = f64> {
     /// Gain of stored (kinetic and elastic) energy; zero over a period of an orbit.
     pub stored: D,
     /// Imbalance of the energies, relative to the energy converted, dimensionless.
+    #[schemars(extend("x-unit" = "1"))]
     pub residual: D,
 }
 

@@ -63,11 +63,13 @@ pub struct PhysicalHarmonic {
     #[schemars(extend("x-unit" = "m"))]
     pub tip: f64,
     /// Phase lag behind sin(order · ωt), degrees in (−180, 180].
+    #[schemars(extend("x-unit" = "degree"))]
     pub tip_phase: f64,
     /// Amplitude of the force, N.
     #[schemars(extend("x-unit" = "N"))]
     pub force: f64,
     /// Phase lag of the force, degrees in (−180, 180].
+    #[schemars(extend("x-unit" = "degree"))]
     pub force_phase: f64,
     /// Amplitude of the slope dw/dx at the tip, dimensionless, if the lever's length is known.
     #[serde(skip_serializing_if = "Option::is_none")]

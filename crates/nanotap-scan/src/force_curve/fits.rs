@@ -47,6 +47,7 @@ pub struct ContactFit {
     pub reduced_modulus: f64,
     /// Young's modulus of the sample, Pa, with the case's Poisson ratio and tip; None if these are
     /// unknown.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub modulus: Option<f64>,
     /// Separation at which the indentation begins, m.
     #[schemars(extend("x-unit" = "m"))]

@@ -62,6 +62,7 @@ pub struct StaticPoint {
     pub distance: f64,
     /// Separation of tip and undeformed surface, z + deflection, m; negative: minus the
     /// indentation.
+    #[schemars(extend("x-unit" = "m"))]
     pub separation: f64,
     /// Deflection of the tip, positive away from the sample, m.
     #[schemars(extend("x-unit" = "m"))]
@@ -163,12 +164,15 @@ pub struct ForceCurveReport {
     #[schemars(extend("x-unit" = "m"))]
     pub pull_off: Option<f64>,
     /// Largest force of the sample on the tip, N; 0 if it never repels.
+    #[schemars(extend("x-unit" = "N"))]
     pub peak_force: f64,
     /// Contact distances, adhesion, energies and indentation.
     pub summary: ForceCurveSummary,
     /// Reduced modulus E* of tip and sample of the case, Pa, if its law has one.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub reduced_modulus: Option<f64>,
     /// Young's modulus of the sample of the case, Pa, if its law has one.
+    #[schemars(extend("x-unit" = "Pa"))]
     pub modulus: Option<f64>,
     /// Fits of contact models to the unloading part.
     pub fits: Vec<ContactFit>,

@@ -23,10 +23,12 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ToneEstimates {
     /// Virial of the tip–sample force in the tone, J; negative where the force repels.
+    #[schemars(extend("x-unit" = "J"))]
     pub virial: f64,
     /// Energy that the force takes from the tone in one of its periods, J.
     #[schemars(extend("x-unit" = "J"))]
     #[serde(rename = "E_dis")]
+    #[schemars(extend("x-unit" = "J"))]
     pub dissipation: f64,
 }
 

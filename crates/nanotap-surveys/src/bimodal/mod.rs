@@ -165,6 +165,7 @@ rows! {
         /// Lowest force on the tip in N.
         #[schemars(extend("x-unit" = "N"))]
         #[serde(rename = "F_min")]
+        #[schemars(extend("x-unit" = "N"))]
         pub least_force: f64,
         /// Least height of the tip over the undeformed surface in m.
         #[schemars(extend("x-unit" = "m"))]
@@ -199,9 +200,11 @@ pub struct BimodalReport {
     pub free: [FreeTone; 2],
     /// Amplitude of the first tone at which the approach ends, in m, if the case has a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub setpoint: Option<f64>,
     /// Reduced modulus E* of tip and sample of the case in Pa, if its law has one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "Pa"))]
     pub reduced_modulus: Option<f64>,
     /// Storage and loss modulus, in Pa, of a sample that relaxes, at the free frequency of each tone.
     #[serde(skip_serializing_if = "Option::is_none")]

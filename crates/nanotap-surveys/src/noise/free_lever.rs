@@ -30,12 +30,14 @@ pub struct Calibrations {
     pub k: f64,
     /// Spring constant by the thermal method, N/m: from the first mode's peak, read by an optical
     /// lever that was calibrated against a hard surface, with the factor 0.817 of a uniform beam.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub thermal: f64,
     /// Spring constant by the thermal method without this factor, N/m.
     #[schemars(extend("x-unit" = "N/m"))]
     pub thermal_without_factor: f64,
     /// Spring constant by Sader's method from width, length, f0 and Q in air, N/m; None if the
     /// dimensions are unknown or another fluid is given.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub sader: Option<f64>,
 }
 
@@ -43,9 +45,10 @@ pub struct Calibrations {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ThermalSpectrum {
     /// Frequencies in Hz, dense at the resonances.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: Vec<f64>,
     /// One-sided density of the tip deflection in m²/Hz.
-    #[schemars(extend("x-unit" = "m²/Hz"))]
+    #[schemars(extend("x-unit" = "m^2/Hz"))]
     pub density: Vec<f64>,
 }
 

@@ -43,9 +43,10 @@ pub struct ReadingSpectrum {
     #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: Vec<f64>,
     /// Density of the amplitude at these frequencies, m²/Hz.
-    #[schemars(extend("x-unit" = "m²/Hz"))]
+    #[schemars(extend("x-unit" = "m^2/Hz"))]
     pub amplitude: Vec<f64>,
     /// Density of the phase at these frequencies, degrees²/Hz.
+    #[schemars(extend("x-unit" = "degree^2/Hz"))]
     pub phase: Vec<f64>,
 }
 

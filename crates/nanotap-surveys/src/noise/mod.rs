@@ -62,13 +62,16 @@ pub struct NoiseReport {
     /// Amplitude that the lock-in amplifier reads, in m.
     #[schemars(extend("x-unit" = "m"))]
     #[serde(rename = "A")]
+    #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,
     /// Root mean square of the noise of this amplitude in m.
     #[schemars(extend("x-unit" = "m"))]
     pub amplitude_rms: f64,
     /// Phase that the lock-in amplifier reads, behind the drive, in degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase: f64,
     /// Root mean square of the noise of this phase in degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase_rms: f64,
     /// Frequency of the drive, Hz.
     #[schemars(extend("x-unit" = "Hz"))]
@@ -81,6 +84,7 @@ pub struct NoiseReport {
     #[schemars(extend("x-unit" = "m"))]
     pub free_amplitude_rms: f64,
     /// Root mean square of the noise of the phase of the free lever under the same drive, degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub free_phase_rms: f64,
     /// Root mean square of the noise with which frequency modulation reads the free lever's frequency,
     /// in the bandwidth and at the amplitude of this drive, in Hz.

@@ -39,8 +39,10 @@ pub struct SaddleDistance {
     /// Amplitude of the unstable orbit in m.
     #[schemars(extend("x-unit" = "m"))]
     #[serde(rename = "A")]
+    #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,
     /// Phase of the unstable orbit behind the drive, in degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase: f64,
 }
 

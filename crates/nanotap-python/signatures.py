@@ -82,7 +82,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "simulate": (
         (SERIES, *ARRAYS),
-        "xr.Dataset",
+        "StudyDataset",
         (
             "The observables, with the names of the terminal's JSON: `classification`, `period`, "
             "`tip_max` …; `strobe` over `strobe_period` and `state`; `events` (their times) with "
@@ -92,7 +92,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "orbit": (
         ARRAYS,
-        "Orbit | xr.Dataset",
+        "Orbit | StudyDataset",
         (
             "The orbit; over arrays, a Dataset of the observables of each, with `failure` where "
             "there is none."
@@ -105,7 +105,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "branch": (
         (THREADS, PROGRESS),
-        "xr.Dataset",
+        "StudyDataset",
         (
             "The orbits over `point` (`branch`, the parameter by its name, `stable`, `tip_max`, "
             "`states` …) and the bifurcations over `bifurcation` (`bifurcation_kind`, "
@@ -115,7 +115,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "approach": (
         (THREADS, PROGRESS),
-        "xr.Dataset",
+        "StudyDataset",
         (
             "The observables over `way` (approach, retract) and the distance (with the name of its "
             "parameter, with `zc` in metres for a physical case): `first_harmonic`, `phase`, "
@@ -128,7 +128,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "sweep": (
         DATASET,
-        "xr.Dataset",
+        "StudyDataset",
         (
             "The dataset, as `open` opens it: lazily from `out`. After Ctrl-C, the `result` of the "
             "exception is the finished part of the dataset, and the same call resumes in `out`."
@@ -136,7 +136,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "window": (
         tuple(entry for entry in DATASET if entry[0] != "chunk"),
-        "xr.Dataset",
+        "StudyDataset",
         (
             "The sweep with `condition` over both parameters: no-contact, one-period-1, "
             "second-state, subharmonic, irregular, undecided, or setpoint-unreached; `share` is the "
@@ -146,7 +146,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "basin": (
         DATASET,
-        "xr.Dataset",
+        "StudyDataset",
         (
             "`attractor` over the two entries of the state: an index into the attractors of the "
             "attribute `attractors` (JSON), negative where there is none."
@@ -172,7 +172,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
     "scan": (
         DATASET,
-        "xr.Dataset",
+        "StudyDataset",
         (
             "`height`, `amplitude_error`, `phase`, `peak_force`, `dissipation`, `state` … over "
             "`direction` (trace, retrace), `y` and `x`; the listed drive periods over `k` "
@@ -339,8 +339,9 @@ from ._report import Report
 from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:
-    import xarray as xr
     from distributed import Client
+
+    from ._study_dataset import StudyDataset
 '''
 
 
@@ -410,7 +411,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
                 ),
             )
         )
-    quoted = f'"{result}"' if "xr." in result else result
+    quoted = f'"{result}"' if "Dataset" in result else result
 
     def signature(keys: str, type_: str) -> str:
         tail = [f"    **parameters: {keys},"] if keys else []
@@ -437,7 +438,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     )
     if name == "orbit":
         single = signature("Value", "Orbit")
-        many = signature("Varied", '"xr.Dataset"')
+        many = signature("Varied", '"StudyDataset"')
         whole = signature("Varied", quoted)
         single = single.replace("(\n", "(  # type: ignore[overload-overlap]\n", 1)
         return f"@overload\n{single} ...\n@overload\n{many} ...\n{whole}\n{body}"

@@ -131,6 +131,33 @@ const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
     ),
     ("parameter", "the parameter", "1"),
     ("branch", "index of the branch", "1"),
+    ("locus", "index of the curve in two parameters", "1"),
+    ("event", "event that the curve follows", "1"),
+    ("first", "first parameter along the curve", "1"),
+    ("second", "second parameter along the curve", "1"),
+    ("kind", "kind of the bifurcation", "1"),
+    ("criticality", "supercritical or subcritical", "1"),
+    ("uncertainty", "uncertainty of the parameter", "1"),
+    ("reason", "why there is no motion", "1"),
+    ("way", "direction in which the sample moves", "1"),
+    ("direction", "direction of the line", "1"),
+    ("part", "real or imaginary part", "1"),
+    ("energy", "entry of the energy balance", "1"),
+    ("condition", "what imaging meets at the point", "1"),
+    ("kind_of_point", "condition of imaging", "1"),
+    ("method", "integration method", "1"),
+    ("switching", "how switches are located", "1"),
+    (
+        "apparent_period",
+        "period with which the strobe points repeat",
+        PERIODS,
+    ),
+    ("longest_apparent", "longest period that was tried", PERIODS),
+    (
+        "closure",
+        "difference of strobe points one apparent period apart, relative to their size",
+        "1",
+    ),
 ];
 
 const STATE: &str = "model units";

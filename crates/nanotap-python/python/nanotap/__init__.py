@@ -42,6 +42,7 @@ from ._studies import fit_map, paper
 
 if TYPE_CHECKING:
     from . import export, plot
+    from ._study_dataset import StudyDataset
 
 __all__ = [
     "Attractor",
@@ -60,6 +61,7 @@ __all__ = [
     "Reconstruction",
     "Record",
     "Report",
+    "StudyDataset",
     "__version__",
     "catalogue",
     "export",
@@ -77,6 +79,9 @@ __all__ += _signatures.__all__
 
 
 def __getattr__(name: str) -> object:
+    # Nor is xarray loaded before it is used.
+    if name == "StudyDataset":
+        return import_module("._study_dataset", __name__).StudyDataset
     # matplotlib and pyarrow take longer to import than everything else together.
     if name in {"plot", "export"}:
         try:

@@ -12,6 +12,7 @@ import numpy as np
 from . import _arguments, _nanotap
 from ._arguments import Progress
 from ._case import Case, Path, missing
+from ._describe import describe
 from ._interrupt import Interrupted, nothing, stoppable
 from ._motions import _cased
 from ._progress import bar
@@ -191,10 +192,11 @@ def window(
     shares = found["shares"]
     if (targets := found.get("targets")) is not None:
         ds = _judged(ds, dims, targets)
-    return ds.assign(
+    ds = ds.assign(
         condition=xr.DataArray(np.array(found["conditions"], dtype=str), dims=dims),
         share=("kind_of_point", np.array(list(shares.values())), _SHARE),
     ).assign_coords(kind_of_point=np.array(list(shares), dtype=str))
+    return describe(ds)
 
 
 def _judged(

@@ -35,7 +35,15 @@ def name_in_si(name: str) -> str:
 def _attributes(name: str) -> dict[str, str]:
     """`long_name` and `units` of an entry; empty if unknown."""
     # The points of branches and of bifurcations have the observables of motions.
-    for before in ("bifurcation_", "branch_", "coexisting_", "attractor_", "event_"):
+    prefixes = (
+        "bifurcation_",
+        "branch_",
+        "coexisting_",
+        "attractor_",
+        "event_",
+        "locus_",
+    )
+    for before in prefixes:
         if name not in _GLOSSARY["model"]:
             name = name.removeprefix(before)
     physical = name.startswith("physical_")

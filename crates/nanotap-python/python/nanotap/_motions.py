@@ -89,7 +89,7 @@ def orbit(
     threads: int | None,
     progress: Progress,
     parameters: Mapping[str, Any],
-) -> "Orbit | xr.Dataset":
+) -> "Orbit | StudyDataset":
     """A periodic orbit, or one for each value of the arrays in `parameters`."""
     case, varied = _split(case, options, parameters)
     _arguments.optional_count("threads", threads)

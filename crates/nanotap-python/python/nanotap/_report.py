@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ._describe import described
 from ._record import Record
 
 if TYPE_CHECKING:
@@ -30,7 +31,13 @@ class Answer:
     @cached_property
     def tables(self) -> dict[str, list[dict[str, Any]]]:
         """The columns of each table: `name`, `label`, `unit`, `values`."""
-        return {one["name"]: one["columns"] for one in json.loads(self._of("tables"))}
+        found = {one["name"]: one["columns"] for one in json.loads(self._of("tables"))}
+        for column in (column for columns in found.values() for column in columns):
+            name = column["name"]
+            column["label"] = (
+                column["label"] or described(name) or name.replace("_", " ")
+            )
+        return found
 
     @cached_property
     def csv(self) -> str | None:

@@ -12,8 +12,9 @@ from ._report import Report
 from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:
-    import xarray as xr
     from distributed import Client
+
+    from ._study_dataset import StudyDataset
 
 __all__ = [
     "approach",
@@ -91,7 +92,7 @@ def simulate(
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Simulate a motion: its steady state or its transient.
 
     Parameters
@@ -195,7 +196,7 @@ def orbit(
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
-) -> "xr.Dataset": ...
+) -> "StudyDataset": ...
 def orbit(
     case: Case,
     *,
@@ -210,7 +211,7 @@ def orbit(
     threads: int | None = None,
     progress: Progress = None,
     **parameters: Varied,
-) -> "Orbit | xr.Dataset":
+) -> "Orbit | StudyDataset":
     """Compute a periodic orbit by Newton's method, stable or not.
 
     Parameters
@@ -365,7 +366,7 @@ def branch(
     max_step: float = 0.01,
     threads: int | None = None,
     progress: Progress = None,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Periodic orbits followed in a parameter, stable and unstable, with their
     bifurcations.
 
@@ -455,7 +456,7 @@ def approach(
     closest: float | str | None = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Amplitude, phase, force and energy against the distance to the sample, both ways,
     with the branches that coexist.
 
@@ -774,7 +775,7 @@ def sweep(
     threads: int | None = None,
     client: "Client | None" = None,
     progress: Progress = None,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Sweep one or two parameters, from any number of initial states.
 
     Parameters
@@ -866,7 +867,7 @@ def window(
     threads: int | None = None,
     client: "Client | None" = None,
     progress: Progress = None,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """The operating window over two parameters: where there is only one motion, and where
     a second state, subharmonics or chaos threaten.
 
@@ -941,7 +942,7 @@ def basin(
     threads: int | None = None,
     client: "Client | None" = None,
     progress: Progress = None,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Compute basins of attraction on a two-dimensional slice of initial states.
 
     Parameters
@@ -1317,7 +1318,7 @@ def scan(
     threads: int | None = None,
     client: "Client | None" = None,
     progress: Progress = None,
-) -> "xr.Dataset":
+) -> "StudyDataset":
     """Scan of a line or an image under feedback, drive period by period.
 
     Parameters

@@ -13,6 +13,7 @@ from ._describe import case_attributes, declared, describe
 from ._interrupt import Interrupted, part_of, stoppable
 from ._motions import _cased, words
 from ._progress import bar
+from ._quantity import si_unit
 from ._record import Record, plain
 from ._report import Answer, Report
 from ._results import (
@@ -136,22 +137,14 @@ def _branch_dataset(
         curves = loci["curves"]
         lengths = [len(curve["first"]) for curve in curves]
         ds = ds.assign(
-            locus=("locus_point", np.repeat(np.arange(len(curves)), lengths)),
-            locus_kind=(
-                "locus_point",
-                np.repeat([str(c["kind"]) for c in curves], lengths),
-            ),
-            locus_event=(
-                "locus_point",
-                np.repeat([str(c.get("event", "")) for c in curves], lengths),
-            ),
-            locus_period=(
-                "locus_point",
-                np.repeat([int(c["period"]) for c in curves], lengths),
-            ),
-            locus_first=("locus_point", _joined(curve["first"] for curve in curves)),
-            locus_second=("locus_point", _joined(curve["second"] for curve in curves)),
+            locus=("locus_point", np.repeat(np.arange(len(curves)), lengths))
         )
+        for key, made in (("kind", str), ("event", str), ("period", int)):
+            labels = [made(curve.get(key, "")) for curve in curves]
+            ds[f"locus_{key}"] = ("locus_point", np.repeat(labels, lengths))
+        for key, of in (("first", name), ("second", loci["second"])):
+            along = _joined(curve[key] for curve in curves)
+            ds[f"locus_{key}"] = ("locus_point", along, {"units": si_unit(of) or "1"})
         ds.attrs["second"] = loci["second"]
         ds.attrs["second_symbol"] = symbols.get(loci["second"], loci["second"])
     ds.attrs.update(case_attributes(case, "branches of periodic orbits"))
@@ -160,6 +153,7 @@ def _branch_dataset(
         parameter_symbol=symbols.get(name, name),
         **_shown(units, "branch", report, ("branches", "failures")),
     )
+    ds[name].attrs["long_name"] = _nanotap.label(name, symbols.get(name, name))
     unit = report.get("parameter_unit")
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
@@ -355,11 +349,14 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
     length = report["size"][0]
     pixels = variables["height"][1].shape[-1] if variables else 0
     y = [line["y"] for line in report["lines"] if line["direction"] == ways[0]]
-    metres = {"units": "m"}
+    along, across = (
+        {"long_name": f"position {which} the line", "units": "m"}
+        for which in ("along", "across")
+    )
     coords: dict[str, Any] = {
         "direction": words(ways),
-        "x": ("x", (np.arange(pixels) + 0.5) * length / max(pixels, 1), metres),
-        "y": ("y", np.array(y), metres),
+        "x": ("x", (np.arange(pixels) + 0.5) * length / max(pixels, 1), along),
+        "y": ("y", np.array(y), across),
     }
     for name in report["periods"][0] if report["periods"] else ():
         listed = [
@@ -372,6 +369,7 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "StudyDataset":
             variables[f"period_{name}"] = entry
     ds = StudyDataset(variables, coords)
     ds.attrs.update(case_attributes(case, "scan"))
+    describe(ds)
     for name, value in report.items():
         if name not in {"trace", "retrace", "periods"} and value is not None:
             plain = isinstance(value, str | float) and not isinstance(value, bool)

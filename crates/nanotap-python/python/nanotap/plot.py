@@ -587,7 +587,7 @@ def scan(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
 
 def _loaded(value: Any) -> Any:
     """An attribute of a Dataset, which is JSON unless it is a word or a number."""
-    if not isinstance(value, str) or value[:1] not in "[{tfn":
+    if not isinstance(value, str):
         return np.asarray(value).tolist()
     try:
         return json.loads(value)
@@ -609,11 +609,11 @@ def show(result: Any, **options: Any) -> "Figure":
     if isinstance(result, Answered):
         return result.plot(**options)
     draw_it: Callable[..., Figure]
+    if "figure" in getattr(result, "attrs", ()):
+        return draw(result.attrs["figure"], **options)
     for name, draw_it in _FIGURES_BY_VARIABLE.items():
         if name in getattr(result, "variables", ()):
             return draw_it(result, **options)
-    if "figure" in getattr(result, "attrs", ()):
-        return draw(result.attrs["figure"], **options)
     message = f"there is no figure for a {type(result).__name__}"
     raise TypeError(message)
 

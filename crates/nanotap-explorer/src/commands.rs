@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use nanotap::study::registry;
 use serde_json::{Map, Value};
 
 use crate::App;
@@ -82,7 +83,9 @@ pub(crate) fn study_command(
             }
         }
     }
-    let _ = write!(line, " --plot {name}.svg");
+    if registry::study(name).is_some_and(|entry| entry.has_figure) {
+        let _ = write!(line, " --plot {name}.svg");
+    }
     Ok(line)
 }
 

@@ -57,6 +57,8 @@ pub trait Study {
     const WITHOUT_DISTANCE: bool = false;
     /// Whether the tones of the drive may have any ratio, so that they never repeat together.
     const ANY_RATIO: bool = false;
+    /// Whether the study has a figure, which its command draws with `--plot`.
+    const HAS_FIGURE: bool = true;
     /// Whether the report of cancelled work holds the finished part, and states that it is a part.
     const PARTIAL: bool = false;
 

@@ -221,6 +221,7 @@ impl Study for LeverStudy {
     const ANY_DISTANCE: bool = true;
     type Options = LeverOptions;
     type Report = LeverReport;
+    const HAS_FIGURE: bool = false;
 
     fn frames<'a>(_: &Case, report: &'a LeverReport) -> Vec<Frame<'a>> {
         vec![report.lever_table()]

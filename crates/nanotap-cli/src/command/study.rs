@@ -125,6 +125,18 @@ mod tests {
         assert_eq!(typed.case.set, ["omega=3", "alpha4=20"]);
     }
 
+    /// The page prints `--plot` for studies with a figure.
+    #[test]
+    fn a_command_has_plot_where_its_study_has_a_figure() {
+        let whole = Own::augment_subcommands(Command::new("nanotap"));
+        for entry in STUDIES {
+            let command = whole.find_subcommand(entry.name);
+            let mut flags = command.into_iter().flat_map(Command::get_arguments);
+            let has_plot = flags.any(|flag| flag.get_long() == Some("plot"));
+            assert_eq!(has_plot, entry.has_figure, "{}", entry.name);
+        }
+    }
+
     #[test]
     fn its_text_is_a_line_a_field() {
         let document = serde_json::json!({

@@ -66,6 +66,8 @@ pub struct StudyEntry {
     pub counted: &'static str,
     /// Whether the report of cancelled work holds the finished part.
     pub partial: bool,
+    /// Whether it has a figure, which its command draws with `--plot`.
+    pub has_figure: bool,
     /// Whether it chooses the distance itself, so that none is solved for a setpoint.
     pub any_distance: bool,
     /// Runs it to its report, if that is a document.
@@ -126,6 +128,7 @@ impl StudyEntry {
             report: answer_schema::<Document<'static, S::Report>>,
             counted: S::COUNTED,
             partial: S::PARTIAL,
+            has_figure: S::HAS_FIGURE,
             any_distance: S::ANY_DISTANCE,
             answer: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
@@ -162,6 +165,7 @@ impl StudyEntry {
             report: answer_schema::<S::Report>,
             counted: S::COUNTED,
             partial: true,
+            has_figure: true,
             any_distance: false,
             answer: None,
             dataset: Some(|case, request, control| {

@@ -2,7 +2,6 @@
 their figures are drawn from what was saved."""
 
 import csv
-import math
 import pickle
 import subprocess
 
@@ -122,7 +121,7 @@ def test_the_first_table_is_the_terminals_file(study):
 
 def test_every_variable_has_a_unit_and_a_name(study):
     for name, variable in study[0].ds.variables.items():
-        if name in {"state", "energy", "direction", "way", "part"}:
+        if name == "state":
             continue
         assert variable.attrs.get("long_name"), name
         assert variable.dtype.kind in "UO" or variable.attrs.get("units"), name
@@ -196,11 +195,11 @@ def test_records_of_a_physical_case_are_in_si(name, options):
             assert entry in OF_STATES or not unit.startswith(MODEL), (path, entry, unit)
         physical = part.to_dict().get("physical") or {}
         for entry, value in physical.items():
-            if entry in part and entry not in OF_STATES and isinstance(value, float):
+            is_number = isinstance(value, float | list) and entry != "harmonics"
+            if entry in part and entry not in OF_STATES and is_number:
                 assert part[entry] == value, (path, entry)
                 compared += 1
     assert compared > 0 or name == "noise"
-    assert document.to_dict() != {} and math.isfinite(len(document))
 
 
 def test_derivatives_say_their_unit():

@@ -415,6 +415,8 @@ impl<'de> Deserialize<'de> for Table {
             name: Option<String>,
             columns: Map<String, Value>,
             #[serde(default)]
+            lines: Vec<u64>,
+            #[serde(default)]
             notes: BTreeMap<String, String>,
         }
         let given = Given::deserialize(deserializer)?;
@@ -427,7 +429,7 @@ impl<'de> Deserialize<'de> for Table {
         let table = Self {
             name: given.name.unwrap_or_else(|| "data".to_owned()),
             columns: columns.collect::<Result<_, D::Error>>()?,
-            lines: Vec::new(),
+            lines: given.lines,
             notes: given.notes.into_iter().collect(),
             remarks: Vec::new(),
         };
@@ -451,6 +453,7 @@ impl JsonSchema for Table {
             "properties": {
                 "name": {"type": "string"},
                 "columns": {"type": "object", "additionalProperties": column},
+                "lines": {"type": "array", "items": {"type": "integer", "minimum": 0}},
                 "notes": {"type": "object", "additionalProperties": {"type": "string"}},
             },
             "required": ["columns"],

@@ -72,12 +72,12 @@ const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 pub struct Upset {
     /// Change of the tip's speed, in the model's unit of length per unit of time, positive away
     /// from the sample.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Velocity.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Velocity.model_unit()))]
     pub tip_speed: f64,
     /// Impulse on the tip, in the model's unit of force times time, positive away from the sample.
     pub impulse: f64,
     /// Energy that the impulse would give the lever at rest, in the model's unit of energy.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Energy.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Energy.model_unit()))]
     pub energy: f64,
     /// Phase of the drive at the knock, in degrees.
     #[schemars(extend("x-unit" = "degree"))]
@@ -90,7 +90,7 @@ pub struct Upset {
     /// Amplitude at the drive frequency of the motion that follows, in the model's unit of length,
     /// if it is periodic.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub first_harmonic: Option<f64>,
     /// State at drive phase 0 of the motion that follows, in the model's units. Its entries are a_1
     /// … a_N (or x), their rates, then any memory of the sample.
@@ -138,10 +138,9 @@ pub struct Knocks {
     pub instants: usize,
     /// Largest change of the tip's speed that was tried, in the model's unit of length per unit of
     /// time.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Velocity.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Velocity.model_unit()))]
     pub largest_tried: f64,
     /// Largest change of the tip's speed that was tried in a physical case, m/s.
-    #[schemars(extend("x-unit" = "m/s"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "m/s"))]
     pub largest_tried_in_si: Option<f64>,

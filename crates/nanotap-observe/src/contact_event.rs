@@ -12,13 +12,13 @@ use nanotap_model::Model;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ContactEvent {
     /// Time from the end of the transient, in the model's unit.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Time.model_unit()))]
+    #[schemars(extend("x-unit" = crate::Dimension::Time.model_unit()))]
     pub tau: f64,
     /// Whether contact begins or ends, or the tip hits a rigid stop.
     pub kind: ContactEventKind,
     /// Rate of the gap just before the switch, in the model's unit. At the end of contact with a
     /// Kelvin–Voigt surface, which followed the tip, it is the rate of the tip's height.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Velocity.model_unit()))]
+    #[schemars(extend("x-unit" = crate::Dimension::Velocity.model_unit()))]
     pub gap_rate: f64,
 }
 

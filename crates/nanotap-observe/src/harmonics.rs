@@ -21,21 +21,21 @@ pub struct Harmonic {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub product: Option<Vec<i32>>,
     /// Amplitude of the tip deflection, in the model's unit of length (g₀ for a beam).
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = crate::Dimension::Length.model_unit()))]
     pub tip: f64,
     /// Phase lag of the tip deflection behind sin(order · Ωτ), degrees in (−180, 180].
     #[schemars(extend("x-unit" = "degree"))]
     pub tip_phase: f64,
     /// Amplitude of the force of the sample on the tip, in the model's unit of force (EI g₀/L³ for
     /// a beam).
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Force.model_unit()))]
+    #[schemars(extend("x-unit" = crate::Dimension::Force.model_unit()))]
     pub force: f64,
     /// Phase lag of the contact force, degrees in (−180, 180].
     #[schemars(extend("x-unit" = "degree"))]
     pub force_phase: f64,
     /// Amplitude of the slope dW/dξ at the tip, in the model's unit g₀/L, for a beam.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Slope.model_unit()))]
+    #[schemars(extend("x-unit" = crate::Dimension::Slope.model_unit()))]
     pub slope: Option<f64>,
 }
 

@@ -278,7 +278,7 @@ pub(crate) fn figure<'py>(
         let figure = match kind.as_str() {
             "basin" => figures::basin::figure(&store)?,
             "scan" => figures::scan::scan_figure(&ScanLines::report(&store)?),
-            "fit" => figures::fit::fit_map_figure(&store)?,
+            "fit" => figures::fit::FitMaps::of(&store)?.figure(),
             _ => figures::sweep::figure(&store)?,
         };
         drawn(&figure, &format)

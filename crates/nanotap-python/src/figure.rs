@@ -7,6 +7,7 @@ use nanotap::case::units::prefixed;
 use nanotap::figure::approach::ApproachCurves;
 use nanotap::figure::basin::BasinTable;
 use nanotap::figure::branch::BranchCurves;
+use nanotap::figure::fit::FitMaps;
 use nanotap::figure::panels::MotionCurves;
 use nanotap::figure::scan::scan_figure;
 use nanotap::figure::sweep::SweepTable;
@@ -88,6 +89,7 @@ pub(crate) fn describe(
             "branch" => Some(read::<BranchCurves>(facts)?.figure()),
             "approach" => Some(read::<ApproachCurves>(facts)?.figure()),
             "motion" => Some(read::<MotionCurves>(facts)?.figure()),
+            "fit-map" => Some(read::<FitMaps>(facts)?.figure()),
             "scan" => Some(scan_figure(&read::<ScanReport>(facts)?)),
             _ => None,
         };

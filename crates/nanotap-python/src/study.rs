@@ -171,12 +171,13 @@ pub(crate) fn report_schema(name: &str) -> PyResult<String> {
     Ok((entry(name)?.report)().as_value().to_string())
 }
 
-/// A table of measured values from a CSV file, as JSON.
+/// A table of measured values from a CSV file, as JSON, with the line of each row.
 #[pyfunction]
 pub(crate) fn table(path: PathBuf) -> PyResult<String> {
     let table = Table::read(&path).map_err(Failure::from)?;
-    let text = serde_json::to_string(&table).map_err(Error::from);
-    Ok(text.map_err(Failure::from)?)
+    let mut value = serde_json::to_value(&table).map_err(Failure::from)?;
+    value["lines"] = json!(table.lines);
+    Ok(value.to_string())
 }
 
 /// The JSON of a request.

@@ -66,11 +66,11 @@ pub struct Motion {
     pub period: Option<usize>,
     /// Largest tip deflection W of the orbit, in the model's unit of length; `None` if no orbit was
     /// found.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub tip_max: Option<f64>,
     /// Smallest tip deflection W of the orbit, in the model's unit of length; `None` if no orbit
     /// was found.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub tip_min: Option<f64>,
     /// The extrema of the tip deflection in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -35,17 +35,17 @@ pub struct ModeTable {
     /// as a fraction of its static stiffness k = 3EI/L³.
     pub static_excess: f64,
     /// Frequencies Ω of the Galerkin equations in free flight, dimensionless.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Frequency.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Frequency.model_unit()))]
     pub free: Vec<f64>,
     /// Frequencies Ω of the Galerkin equations in contact, dimensionless.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Frequency.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Frequency.model_unit()))]
     pub contact: Vec<f64>,
     /// Frequencies Ω of the exact beam in free flight, dimensionless; empty for a lever whose modes
     /// were measured, which is not a uniform beam.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Frequency.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Frequency.model_unit()))]
     pub exact_free: Vec<f64>,
     /// Frequencies Ω of the exact beam in contact, dimensionless; empty as those in free flight.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Frequency.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Frequency.model_unit()))]
     pub exact_contact: Vec<f64>,
     /// Quality factors of the free modes, |λ|/(2 |Re λ|); infinite (`null`) without damping,
     /// `None` where not every mode oscillates.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nanotap::case::Key;
 use nanotap::dataset::Share;
-use nanotap::figure::fit::{fit_figure, fit_map_figure};
+use nanotap::figure::fit::{FitMaps, fit_figure};
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedParameter};
 use serde::Serialize;
@@ -143,7 +143,7 @@ fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Resu
         FitMap::COUNTED,
         request.seed,
         &arguments.plot,
-        fit_map_figure,
+        |store| Ok(FitMaps::of(store)?.figure()),
         output,
     )?;
     output.study(&case, &done, |done| done.text(case.title(), map_text))

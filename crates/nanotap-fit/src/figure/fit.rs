@@ -3,100 +3,157 @@
 use nanotap_figures::{
     Axis, Colour, DOUBLE_COLUMN, Figure, Heatmap, Legend, Line, Markers, Panel, Rule, category,
 };
+use serde::Deserialize;
 
-use crate::fit::{FitReport, FittedColumn, FittedRow, Reading};
 use nanotap_case::Key;
 use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
+use nanotap_dataset::schema::Attributes;
 use nanotap_dataset::{Store, StoreError};
-use nanotap_motions::approach::Way;
 use nanotap_motions::figure::plotted_quantity::PlottedQuantity;
-use nanotap_motions::frequency_modulation::Modulated;
 use nanotap_observe::frame::Row as _;
 use nanotap_observe::table::shown_phase;
+use nanotap_motions::approach::Way;
+use crate::fit::{FitReport, FittedColumn, FittedRow, Reading};
+use nanotap_motions::frequency_modulation::Modulated;
 
 /// Number of panels side by side.
 const ACROSS: usize = 3;
 
-/// A map of each fitted parameter of a force volume; of a single row of pixels, its values.
-///
-/// # Errors
-/// When a chunk is missing or damaged.
-pub fn fit_map_figure(store: &Store) -> Result<Figure, StoreError> {
-    store.require_all()?;
-    let schema = store.schema();
-    let axes = &schema.grid.axes;
-    let mapped: Vec<usize> = (0..schema.variables.len())
-        .filter(|k| {
-            let error = format!("{}_error", schema.variables[*k].name);
-            schema.index_of(&error).is_some()
-        })
-        .collect();
-    let across = mapped.len().clamp(1, 2);
-    let down = mapped.len().div_ceil(across).max(1);
-    let mut figure = Figure::new(down, across)
-        .width(DOUBLE_COLUMN)
-        .height(80.0 * down as f64);
-    for k in mapped {
-        let mut values = Vec::new();
-        for chunk in 0..store.chunks() {
-            values.extend(store.read_chunk(&schema.grid.block(chunk), k)?.numbers());
+/// An axis of a map of fits, or the values of a fitted parameter row by row.
+#[derive(Clone, Debug, Deserialize)]
+pub struct MappedColumn {
+    /// Name of the axis, or key of the parameter.
+    pub name: String,
+    /// SI unit of the values; `1` for pure numbers.
+    pub units: String,
+    /// The values; `None` where nothing was fitted.
+    pub values: Vec<Option<f64>>,
+}
+
+impl MappedColumn {
+    fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        self.values.iter().map(|value| value.unwrap_or(f64::NAN))
+    }
+
+    fn axis(&self) -> Axis {
+        match self.units.as_str() {
+            "1" => Axis::linear(&self.name),
+            units => Axis::linear(format!("{} ({units})", self.name)),
         }
-        let size = values.iter().fold(
-            0.0,
-            |m: f64, v| if v.is_finite() { m.max(v.abs()) } else { m },
-        );
-        let name = &schema.variables[k].name;
-        let kind = Key::find(name).map(Key::kind);
-        let unit = schema.variables[k].attributes.get("units");
-        let unit = unit.and_then(|unit| unit.as_str()).unwrap_or("1");
-        let kind = kind.or_else(|| (unit == "m").then_some(Kind::Length));
+    }
+
+    /// What multiplies the values where they are drawn, and the title with the unit.
+    fn shown(&self) -> (f64, String) {
+        let finite = self.numbers().filter(|value| value.is_finite());
+        let size = finite.fold(0.0, |m: f64, v| m.max(v.abs()));
+        let kind = Key::find(&self.name).map(Key::kind);
+        let kind = kind.or_else(|| (self.units == "m").then_some(Kind::Length));
         let (factor, unit) = match kind {
             Some(kind) if kind != Kind::Number => prefixed(kind, 1.0, size),
-            _ => (1.0, unit.to_owned()),
+            _ => (1.0, self.units.clone()),
         };
         let title = match unit.as_str() {
-            "1" | "" => name.clone(),
-            unit => format!("{name} ({unit})"),
+            "1" | "" => self.name.clone(),
+            unit => format!("{} ({unit})", self.name),
         };
-        let axis = |k: usize| {
-            let axis = &axes[k];
-            let unit = schema
-                .coordinate(&axis.name)
-                .and_then(|c| c.attributes.get("units"));
-            match unit.and_then(|unit| unit.as_str()).unwrap_or("1") {
-                "1" => Axis::linear(&axis.name),
-                unit => Axis::linear(format!("{} ({unit})", axis.name)),
-            }
-        };
-        let scaled = values.iter().map(|value| factor * value);
-        let [rows, columns] = match axes.len() {
-            1 => [1, axes[0].length],
-            _ => [axes[0].length, axes[1].length],
-        };
-        figure = figure.with(if rows == 1 {
-            let positions = schema.axis_values(axes.len() - 1);
-            let points = positions.into_iter().zip(scaled);
-            Panel::new(axis(axes.len() - 1), Axis::linear(title))
-                .with(Markers::new(points).colour(Colour::BLUE))
-        } else {
-            let edges = |k: usize| {
-                let at = schema.axis_values(k);
-                let (first, last) = (at[0], at[at.len() - 1]);
-                let half = 0.5 * (last - first) / (at.len() - 1).max(1) as f64;
-                (first - half, last + half)
-            };
-            Panel::new(axis(1).tight(), axis(0).tight()).with(Heatmap::new(
-                columns,
-                rows,
-                scaled,
-                edges(1),
-                edges(0),
-                Axis::linear(title),
-            ))
-        });
+        (factor, title)
     }
-    Ok(figure)
+}
+
+/// The fitted parameters of a force volume over its pixels.
+#[derive(Clone, Debug, Deserialize)]
+pub struct FitMaps {
+    /// The axes of the pixels, the slowest first.
+    pub axes: Vec<MappedColumn>,
+    /// The parameters.
+    pub maps: Vec<MappedColumn>,
+}
+
+impl FitMaps {
+    /// Reads the parameters of a finished dataset.
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged.
+    pub fn of(store: &Store) -> Result<Self, StoreError> {
+        store.require_all()?;
+        let schema = store.schema();
+        let units = |attributes: &Attributes| {
+            let unit = attributes.get("units").and_then(|unit| unit.as_str());
+            unit.unwrap_or("1").to_owned()
+        };
+        let axes = schema.grid.axes.iter().enumerate().map(|(k, axis)| {
+            let coordinate = schema.coordinate(&axis.name);
+            MappedColumn {
+                name: axis.name.clone(),
+                units: coordinate.map_or_else(|| "1".into(), |c| units(&c.attributes)),
+                values: schema.axis_values(k).into_iter().map(Some).collect(),
+            }
+        });
+        let mut maps = Vec::new();
+        for (k, variable) in schema.variables.iter().enumerate() {
+            if schema
+                .index_of(&format!("{}_error", variable.name))
+                .is_none()
+            {
+                continue;
+            }
+            let mut values = Vec::new();
+            for chunk in 0..store.chunks() {
+                let numbers = store.read_chunk(&schema.grid.block(chunk), k)?.numbers();
+                values.extend(numbers.into_iter().map(Some));
+            }
+            maps.push(MappedColumn {
+                name: variable.name.clone(),
+                units: units(&variable.attributes),
+                values,
+            });
+        }
+        Ok(Self {
+            axes: axes.collect(),
+            maps,
+        })
+    }
+
+    /// A map of each parameter; of a single row of pixels, its values.
+    pub fn figure(&self) -> Figure {
+        let across = self.maps.len().clamp(1, 2);
+        let down = self.maps.len().div_ceil(across).max(1);
+        let figure = Figure::new(down, across)
+            .width(DOUBLE_COLUMN)
+            .height(80.0 * down as f64);
+        let (Some(y), Some(x)) = (self.axes.first(), self.axes.last()) else {
+            return figure;
+        };
+        let [rows, columns] = match self.axes.len() {
+            1 => [1, x.values.len()],
+            _ => [y.values.len(), x.values.len()],
+        };
+        self.maps.iter().fold(figure, |figure, map| {
+            let (factor, title) = map.shown();
+            let scaled = map.numbers().map(|value| factor * value);
+            figure.with(if rows == 1 {
+                Panel::new(x.axis(), Axis::linear(title))
+                    .with(Markers::new(x.numbers().zip(scaled)).colour(Colour::BLUE))
+            } else {
+                let edges = |axis: &MappedColumn| {
+                    let at: Vec<f64> = axis.numbers().collect();
+                    let [first, last] = [at.first(), at.last()].map(|end| *end.unwrap_or(&0.0));
+                    let half = 0.5 * (last - first) / (at.len() - 1).max(1) as f64;
+                    (first - half, last + half)
+                };
+                let scale = Axis::linear(title);
+                Panel::new(x.axis().tight(), y.axis().tight()).with(Heatmap::new(
+                    columns,
+                    rows,
+                    scaled,
+                    edges(x),
+                    edges(y),
+                    scale,
+                ))
+            })
+        })
+    }
 }
 
 /// Each measured quantity with the fit and the other stable orbits, and below it the residuals in

@@ -20,7 +20,11 @@ use nanotap_dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
-use nanotap_error::Error;
+use crate::figure::fit::FitMaps;
+use nanotap_study::Computation;
+use nanotap_study::DatasetPlan;
+use nanotap_study::DatasetStudy;
+use nanotap_study::Study as _;
 use nanotap_figures::Figure;
 use nanotap_study::Computation;
 use nanotap_study::DatasetPlan;
@@ -71,7 +75,7 @@ impl DatasetStudy for FitMap {
     }
 
     fn figure(store: &Store) -> Result<Figure, StoreError> {
-        fit_map_figure(store)
+        Ok(FitMaps::of(store)?.figure())
     }
 }
 

@@ -89,7 +89,7 @@ pub struct ApproachPoint {
     /// Direction in which the sample moves.
     pub way: Way,
     /// The distance, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub gap: f64,
     /// The distance in m, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -158,14 +158,14 @@ pub struct StateJump {
     /// Direction in which the sample moves at the jump.
     pub way: Way,
     /// Distance, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub gap: f64,
     /// Distance in m, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-unit" = "m"))]
     pub zc: Option<f64>,
     /// Uncertainty of the distance, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub uncertainty: f64,
     /// Uncertainty of the distance in m, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -184,10 +184,10 @@ pub struct StateJump {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Hysteresis {
     /// Nearest distance of the interval, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub near: f64,
     /// Farthest distance of the interval, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub far: f64,
     /// Largest difference between approach and retract in the interval. It is that of the amplitude
     /// at the drive frequency, in the model's unit of length, or, where the amplitude is kept
@@ -224,19 +224,19 @@ pub struct ApproachReport {
     /// The key of the distance in a case file.
     pub parameter: &'static str,
     /// First and farthest distance of the approach, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub from: f64,
     /// Distance at which the approach turns back, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub to: f64,
     /// Free amplitude A₀ of the tip at the drive frequency, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub free_amplitude: f64,
     /// Phase lag of the free tip behind the drive, degrees in (−180, 180].
     #[schemars(extend("x-unit" = "degree"))]
     pub free_phase: f64,
     /// Distance at which the free motion begins to touch the sample, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub free_reach: f64,
     /// The motions at the requested distances: those of the approach, then those of the retract.
     pub table: Vec<ApproachPoint>,
@@ -248,7 +248,7 @@ pub struct ApproachReport {
     pub coexisting: Vec<ApproachPoint>,
     /// Least height of the beam above the sample in the motion at the nearest distance, in the
     /// model's unit of length: where it is not above zero, another part than the tip touches.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub beam_clearance: Option<f64>,
     /// Intervals in which approach and retract differ, with ends as exact as those of the branches.
     pub hysteresis: Vec<Hysteresis>,

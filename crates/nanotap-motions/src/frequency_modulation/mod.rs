@@ -45,7 +45,7 @@ rows! {
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
     pub struct Modulated {
         /// Angular frequency of the drive, model units.
-        #[schemars(extend("x-unit" = crate::observe::Dimension::Frequency.model_unit()))]
+        #[schemars(extend("x-unit" = nanotap_observe::Dimension::Frequency.model_unit()))]
         pub drive_frequency: f64,
         /// Strength of the drive, model units: its force, or a driven base's amplitude.
         pub drive_strength: f64,
@@ -59,7 +59,7 @@ rows! {
         /// the loss E₀ of the free lever in a period, model units.
         pub drive_dissipation: f64 = Energy, "dissipation from the drive", "E_drive", Quantity([4, 4]),
         /// Least distance of a sinusoidal oscillation, a driven base's motion included, model units.
-        #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+        #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
         pub closest: f64,
         /// Relative shift Δf/f₀ to first order in the law's static force, dimensionless; None for a
         /// rigid stop and a surface that moves, which have no static force.
@@ -175,13 +175,13 @@ impl Modulated {
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ModulationReport {
     /// Amplitude of the tip's deflection that the loop keeps, model units.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub amplitude: f64,
     /// Phase lag kept by the feedback, degrees.
     #[schemars(extend("x-unit" = "degree"))]
     pub phase: f64,
     /// Angular frequency of the free lever at this phase, model units.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Frequency.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Frequency.model_unit()))]
     pub free_frequency: f64,
     /// Frequency of the free lever at this phase, Hz; only of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]

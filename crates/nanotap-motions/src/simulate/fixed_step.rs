@@ -33,7 +33,7 @@ const TRANSIENT: usize = 500;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct GridEvent {
     /// Time of the grid point from the end of the transient, in the model's unit of time.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Time.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Time.model_unit()))]
     pub tau: f64,
     /// Kind of the switch: `contact_start` or `contact_end`.
     pub kind: &'static str,
@@ -64,13 +64,13 @@ pub struct FixedStepRun {
     /// Longest apparent period looked for: half of the recording, 64 at most.
     pub longest_apparent: usize,
     /// Largest tip displacement on the grid, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub tip_max: f64,
     /// Least tip displacement on the grid, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub tip_min: f64,
     /// Half of the peak-to-peak tip displacement, in the model's unit of length.
-    #[schemars(extend("x-unit" = crate::observe::Dimension::Length.model_unit()))]
+    #[schemars(extend("x-unit" = nanotap_observe::Dimension::Length.model_unit()))]
     pub amplitude: f64,
     /// Contact time / period, from the lengths of the steps.
     pub contact_fraction: f64,

@@ -26,7 +26,6 @@ pub struct ToneEstimates {
     #[schemars(extend("x-unit" = "J"))]
     pub virial: f64,
     /// Energy that the force takes from the tone in one of its periods, J.
-    #[schemars(extend("x-unit" = "J"))]
     #[serde(rename = "E_dis")]
     #[schemars(extend("x-unit" = "J"))]
     pub dissipation: f64,

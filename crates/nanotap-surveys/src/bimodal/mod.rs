@@ -163,7 +163,6 @@ rows! {
         #[serde(rename = "F_max")]
         pub peak_force: f64 = Force, "peak force $F_{max}$", "F_max", Prefixed(4),
         /// Lowest force on the tip in N.
-        #[schemars(extend("x-unit" = "N"))]
         #[serde(rename = "F_min")]
         #[schemars(extend("x-unit" = "N"))]
         pub least_force: f64,

@@ -60,7 +60,6 @@ pub struct NoiseReport {
     /// Period of the orbit in drive periods.
     pub period: usize,
     /// Amplitude that the lock-in amplifier reads, in m.
-    #[schemars(extend("x-unit" = "m"))]
     #[serde(rename = "A")]
     #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,

@@ -37,7 +37,6 @@ pub struct SaddleDistance {
     /// Distance of the boundary of the basin in standard deviations of the noise, dimensionless.
     pub deviations: f64,
     /// Amplitude of the unstable orbit in m.
-    #[schemars(extend("x-unit" = "m"))]
     #[serde(rename = "A")]
     #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,

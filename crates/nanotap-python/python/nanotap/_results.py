@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arguments import Floats
-from ._record import Record
+from ._record import Record, plain
 from ._report import Answer, Answered, Report
 
 if TYPE_CHECKING:
@@ -456,9 +456,10 @@ class Orbit(_Observed, Result):
         """The harmonics as a table."""
         import pandas as pd
 
-        return pd.DataFrame([entry.to_dict() for entry in self.harmonics]).set_index(
-            "order"
-        )
+        table = pd.DataFrame([plain(entry) for entry in self.harmonics])
+        if self.harmonics:
+            table.attrs["units"] = self.harmonics[0].units
+        return table.set_index("order")
 
     def __repr__(self) -> str:
         return (
@@ -626,7 +627,10 @@ class Attractors(Answered, Sequence[Attractor]):
             "contact_fraction",
         ]
         rows = [[getattr(one, name) for name in columns] for one in self]
-        return pd.DataFrame(rows, columns=columns)
+        table = pd.DataFrame(rows, columns=columns)
+        units = self[0].units if len(self) else {}
+        table.attrs["units"] = {name: units[name] for name in columns if name in units}
+        return table
 
     def __repr__(self) -> str:
         lines = [f"  {one!r}" for one in self]
@@ -637,7 +641,12 @@ class Attractors(Answered, Sequence[Attractor]):
         )
 
     def _repr_html_(self) -> str:
-        return str(self.table().to_html())
+        table = self.table()
+        units = table.attrs["units"]
+        heads = {
+            name: f"{name} ({unit})" for name, unit in units.items() if unit != "1"
+        }
+        return str(table.rename(columns=heads).to_html())
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -705,7 +714,7 @@ class Convergence(Result):
         """One row per number of modes."""
         import pandas as pd
 
-        table = pd.DataFrame([motion.to_dict() for motion in self.motions])
+        table = pd.DataFrame([plain(motion) for motion in self.motions])
         return table.assign(difference=self.difference).set_index("modes")
 
     def __repr__(self) -> str:

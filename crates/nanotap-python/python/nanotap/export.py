@@ -150,7 +150,7 @@ def hdf5(result: Any, path: Path) -> None:
         harmonics = result.spectrum().reset_index()
         series = result.series
         attributes = {
-            key: value for key, value in result.to_dict().items() if np.isscalar(value)
+            key: value for key, value in result.document.items() if np.isscalar(value)
         }
     elif hasattr(result, "data_vars"):
         arrays, harmonics, series, attributes = {}, None, result, {}
@@ -166,8 +166,11 @@ def hdf5(result: Any, path: Path) -> None:
                 file.create_dataset(name, data=array)
             if harmonics is not None:
                 group = file.create_group("harmonics")
+                units = harmonics.attrs.get("units", {})
                 for column in harmonics:
-                    group.create_dataset(str(column), data=harmonics[column].to_numpy())
+                    values = harmonics[column].to_numpy()
+                    dataset = group.create_dataset(str(column), data=values)
+                    dataset.attrs["units"] = units.get(column, "1")
             if series is not None:
                 group = file.create_group("series") if arrays else file
                 _datasets(group, series)

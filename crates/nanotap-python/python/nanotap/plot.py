@@ -43,6 +43,7 @@ __all__ = [
     "branch",
     "convergence",
     "fit",
+    "fit_map",
     "modes",
     "orbit",
     "orbits",
@@ -585,6 +586,19 @@ def scan(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     return _drawn("scan", facts, where)
 
 
+def fit_map(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
+    """A map of each fitted parameter of a force volume; of one row of pixels, its values."""
+
+    def column(name: str) -> dict[str, Any]:
+        units = str(ds[name].attrs.get("units", "1"))
+        return {"name": name, "units": units, "values": _cells(ds[name].values.ravel())}
+
+    names = [str(name) for name in ds.data_vars if f"{name}_error" in ds]
+    dims = map(str, ds[names[0]].dims)
+    facts = {"axes": list(map(column, dims)), "maps": list(map(column, names))}
+    return _drawn("fit-map", facts, where)
+
+
 def _loaded(value: Any) -> Any:
     """An attribute of a Dataset, which is JSON unless it is a word or a number."""
     if not isinstance(value, str):
@@ -625,6 +639,7 @@ _FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {
     "period_max": sweep,
     "way": approach,
     "surface": scan,
+    "chi2_reduced": fit_map,
     "tau": run,
     "failure": orbits,
 }

@@ -216,3 +216,60 @@ def test_derivatives_say_their_unit():
     ]
     slope = (ends[1].amplitude - ends[0].amplitude) / (2 * step)
     assert by_distance.amplitude == pytest.approx(slope, rel=1e-4)
+
+
+MODULUS = {"sample.modulus": "60 MPa"}
+
+
+@pytest.mark.parametrize(
+    ("compute", "words"),
+    [
+        (
+            lambda: nanotap.fit(
+                nanotap.Case.from_file("dforce-hertz.toml", **MODULUS),
+                data="hertz-curve.csv",
+                free=["sample.modulus", "gap.offset"],
+                progress=False,
+            ),
+            "fit hertz-curve.csv dforce-hertz.toml --free sample.modulus,gap.offset",
+        ),
+        (
+            lambda: nanotap.fit_map(
+                nanotap.Case.from_file("stiff-lever.toml"),
+                "force-volume.csv",
+                ["x", "y"],
+                ["sample.modulus", "gap.offset"],
+                progress=False,
+            ),
+            (
+                "fit force-volume.csv stiff-lever.toml --free sample.modulus,gap.offset "
+                "--pixels x,y"
+            ),
+        ),
+        (
+            lambda: nanotap.reconstruct(
+                nanotap.Case.from_file("fm-lever.toml"),
+                data="fm-curve.csv",
+                progress=False,
+            ),
+            "reconstruct fm-curve.csv fm-lever.toml",
+        ),
+    ],
+    ids=["fit", "fit_map", "reconstruct"],
+)
+def test_fits_have_the_terminals_file_and_figure(compute, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(CASES)
+    result = compute()
+    command = [PROGRAM, *words.split()]
+    if "hertz" in words:
+        command += [f"--set={key}={value}" for key, value in MODULUS.items()]
+    written, ours = tmp_path / "terminal.csv", tmp_path / "ours.csv"
+    subprocess.run(
+        [*command, "--out", str(written), "--quiet"], check=True, capture_output=True
+    )
+    nanotap.export.csv(result, ours)
+    assert ours.read_bytes() == written.read_bytes()
+    assert isinstance(result.plot(), Figure)
+    result.ds.to_netcdf(tmp_path / "saved.nc")
+    with xr.open_dataset(tmp_path / "saved.nc") as saved:
+        assert isinstance(nanotap.plot.show(saved), Figure)

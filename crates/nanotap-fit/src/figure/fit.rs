@@ -5,17 +5,17 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::fit::{FitReport, FittedColumn, FittedRow, Reading};
 use nanotap_case::Key;
 use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
 use nanotap_dataset::schema::Attributes;
 use nanotap_dataset::{Store, StoreError};
+use nanotap_motions::approach::Way;
 use nanotap_motions::figure::plotted_quantity::PlottedQuantity;
+use nanotap_motions::frequency_modulation::Modulated;
 use nanotap_observe::frame::Row as _;
 use nanotap_observe::table::shown_phase;
-use nanotap_motions::approach::Way;
-use crate::fit::{FitReport, FittedColumn, FittedRow, Reading};
-use nanotap_motions::frequency_modulation::Modulated;
 
 /// Number of panels side by side.
 const ACROSS: usize = 3;

@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{FitOptions, FitReport, FitStudy, fit, names};
-use crate::figure::fit::fit_map_figure;
+use crate::figure::fit::FitMaps;
 use nanotap_case::Case;
 use nanotap_case::table::{Entry, Header, Table};
 use nanotap_dataset::schema::Kind;
@@ -20,16 +20,9 @@ use nanotap_dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
-use crate::figure::fit::FitMaps;
-use nanotap_study::Computation;
-use nanotap_study::DatasetPlan;
-use nanotap_study::DatasetStudy;
-use nanotap_study::Study as _;
+use nanotap_error::Error;
 use nanotap_figures::Figure;
-use nanotap_study::Computation;
-use nanotap_study::DatasetPlan;
-use nanotap_study::DatasetStudy;
-use nanotap_study::Study as _;
+use nanotap_study::{Computation, DatasetPlan, DatasetStudy, Study as _};
 
 /// Largest number of pixels of a map.
 const MAX_PIXELS: usize = 1 << 18;

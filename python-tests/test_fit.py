@@ -221,9 +221,9 @@ def test_instruments_files_are_read(
     path.write_bytes(b"PK")
     with pytest.raises(ValueError, match="not a force curve of JPK"):
         nanotap.read(path)
-    path = tmp_path / "curve.gwy"
-    path.write_bytes(b"GWYP")
-    with pytest.raises(ValueError, match="package gwyfile"):
+    path = tmp_path / "curve.nhf"
+    path.write_bytes(b"")
+    with pytest.raises(ValueError, match="package NSFopen"):
         nanotap.read(path)
     with pytest.raises(FileNotFoundError):
         nanotap.read(tmp_path / "none.ibw")

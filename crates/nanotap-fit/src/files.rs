@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use afm_files::{Curve, Document, Image, Limits, Spectrum, Style};
+pub use afm_files::{Curve, Document, Image, Spectrum};
+use afm_files::{Limits, Style};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -182,14 +183,8 @@ fn walk(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), Err
 /// # Errors
 /// If the file cannot be read or has no such item.
 pub fn item(path: &Path, which: Which) -> Result<Item, Error> {
-    let document = opened(path, Origin::User)?;
-    let refuse = |message: String| {
-        Error::input(
-            format!("{}: {message}", path.display()),
-            "`nanotap files` lists what a file holds",
-        )
-    };
-    let document = document.map_err(|error| refuse(error.to_string()))?;
+    let document = open(path)?;
+    let refuse = |message| refused(path, message);
     let counts = [
         document.curve_count(),
         document.images.len(),
@@ -221,6 +216,22 @@ pub fn item(path: &Path, which: Which) -> Result<Item, Error> {
         }
         Which::First => Err(missing("curve", 0, 0)),
     }
+}
+
+/// Opens a file, to read its curves one by one.
+///
+/// # Errors
+/// If the file cannot be read, or is none of an instrument that is known here.
+pub fn open(path: &Path) -> Result<Document, Error> {
+    opened(path, Origin::User)?.map_err(|error| refused(path, error.to_string()))
+}
+
+/// The error of a file in which something is not found.
+fn refused(path: &Path, message: String) -> Error {
+    Error::input(
+        format!("{}: {message}", path.display()),
+        "`nanotap files` lists what a file holds",
+    )
 }
 
 /// The document of a file that can be read.

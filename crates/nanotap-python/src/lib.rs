@@ -16,6 +16,7 @@ mod dataset;
 mod document;
 mod failure;
 mod figure;
+mod file;
 mod map;
 mod motion;
 mod study;
@@ -32,6 +33,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<case::CaseCore>()?;
+    module.add_class::<file::FileCore>()?;
     module.add_class::<map::MapCore>()?;
     module.add_class::<map::MotionCore>()?;
     module.add_class::<study::ReportCore>()?;

@@ -36,6 +36,9 @@ def test_readable_names_are_the_same_keys():
     assert case.with_(omega=4).with_(drive_frequency=5).omega == 5
     assert case.contact_stiffness == case.alpha4 == case["contact_stiffness"] == 20
     assert case.with_() is case
+    assert case.with_({"drive_frequency": 5}) == case.with_(omega=5)
+    with pytest.raises(TypeError, match="model_units: expected True or False"):
+        case.with_(model_units="yes")
     assert "omega=2.6" in repr(case)
     assert "Ω" in case._repr_html_()
 

@@ -21,7 +21,7 @@ from ._datasets import merge, open
 from ._interrupt import Interrupted
 from ._map import Map, Motion, PeriodicOrbit
 from ._nanotap import __version__
-from ._quantity import Range as range  # noqa: F401 - not for `import *`
+from ._quantity import Range
 from ._read import read
 from ._record import Record
 from ._report import Report
@@ -39,6 +39,9 @@ from ._results import (
 from ._si import in_si
 from ._signatures import *
 from ._studies import fit_map, paper
+
+# Not in `__all__`: `import *` would hide the builtin.
+range = Range
 
 if TYPE_CHECKING:
     from . import export, plot

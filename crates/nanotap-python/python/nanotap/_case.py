@@ -38,6 +38,13 @@ _FOLLOWS = {"period", "physical"}
 _WITHOUT_DISTANCE = {"kind", "modes", "contact", "actuation", "cosine_term"}
 
 
+# Typed as a value of a key: a mapping with keys that is passed by `**` would be refused otherwise.
+def _flag(model_units: Value) -> bool:
+    if not isinstance(model_units, bool):
+        raise TypeError(f"model_units: expected True or False, got {model_units!r}")
+    return model_units
+
+
 class Case:
     """A checked case: a cantilever (dimensionless or in physical units) or an oscillator.
 
@@ -76,14 +83,14 @@ class Case:
         self,
         *,
         catalogue: Path | Iterable[Path] = (),
-        model_units: bool = False,
+        model_units: Value = False,
         **keys: Value,
     ) -> None:
         texts = [
             (os.fspath(path), _nanotap.catalogue_text(existing(path)))
             for path in _paths(catalogue)
         ]
-        self._make(None, key_words(keys), texts, "", model_units)
+        self._make(None, key_words(keys), texts, "", _flag(model_units))
 
     @classmethod
     def from_file(
@@ -91,7 +98,7 @@ class Case:
         path: Path,
         *,
         catalogue: Path | Iterable[Path] = (),
-        model_units: bool = False,
+        model_units: Value = False,
         **keys: Value,
     ) -> "Case":
         """The case of a TOML file, with `keys` replacing its values.
@@ -104,7 +111,7 @@ class Case:
         files = [existing(path) for path in _paths(catalogue)]
         case._core = _nanotap.CaseCore.from_file(
             existing(path), list(case._keys.values()), files
-        ).in_model_units(model_units)
+        ).in_model_units(_flag(model_units))
         case._read()
         return case
 
@@ -131,19 +138,27 @@ class Case:
         }
         return _again(cls, None, key_words(own) | key_words(keys), [], "", False)
 
-    def with_(self, *, model_units: bool | None = None, **keys: Value) -> "Case":
-        """The same case with some keys changed; `None` removes a key. Numbers that are not stated
+    def with_(
+        self,
+        changes: Mapping[str, Value] | None = None,
+        /,
+        *,
+        model_units: Value = None,
+        **keys: Value,
+    ) -> "Case":
+        """The same case with some keys changed; `None` removes a key. Keys with a dot go into a
+        mapping, as in `case.with_({"gap.tip": "12 nm"})`. Numbers that are not stated
         follow: of a case with `free_amplitude` the drive follows a new frequency. In the
         arguments of a study a key varies alone: there the drive's own amplitude stays.
         """
-        if model_units is None:
-            model_units = self._core.model_units
-        if not keys and model_units == self._core.model_units:
+        keys = {**(changes or {}), **keys}
+        in_model = self._core.model_units if model_units is None else _flag(model_units)
+        if not keys and in_model == self._core.model_units:
             return self
         source, _, catalogues, folder = self._core.made_of
         texts = self._keys | key_words(keys, self.kind)
         return _again(
-            type(self), source, texts, catalogues, os.fspath(folder), model_units
+            type(self), source, texts, catalogues, os.fspath(folder), in_model
         )
 
     def _varied(self, keys: Mapping[str, Value]) -> "Case":

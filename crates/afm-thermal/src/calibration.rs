@@ -225,7 +225,7 @@ pub fn calibrate(spectrum: &Spectrum, options: &Options) -> Result<Calibration, 
     let scatter = BinScatter::new(bins, &fit.ratios);
     let (averages, inflation) = averages(spectrum, bins.len(), scatter, &mut warnings);
     let oscillator = fit.oscillator;
-    let spread = spread(spectrum, options, range, oscillator);
+    let spread = spread(spectrum, bins, range, oscillator);
     let is_misfit = is_misfit(bins.len(), scatter.seen, averages, inflation);
     let mut covariance = fit.covariance * (inflation / averages);
     if is_misfit {
@@ -481,7 +481,7 @@ fn is_misfit(bins: usize, seen: f64, averages: f64, inflation: f64) -> bool {
 /// Covariance of the logarithms of the parameters over fits of parts of the range.
 fn spread(
     spectrum: &Spectrum,
-    options: &Options,
+    bins: &[Bin],
     [low, high]: [f64; 2],
     whole: Oscillator,
 ) -> Matrix4<f64> {
@@ -489,11 +489,14 @@ fn spread(
     let mut count = 0.0;
     for [below, above] in PARTS {
         let f0 = whole.f0.clamp(low, high);
-        let part = [f0 - below * (f0 - low), f0 + above * (high - f0)];
-        let Some(of_part) = fit_range(spectrum, options, part, whole) else {
+        let [low, high] = [f0 - below * (f0 - low), f0 + above * (high - f0)];
+        let first = bins.partition_point(|bin| bin.frequency < low);
+        let last = bins.partition_point(|bin| bin.frequency <= high);
+        let part = &bins[first..last.max(first)];
+        let Some(of_part) = fit(part, whole, spectrum.window) else {
             continue;
         };
-        let Oscillator { f0, q, m, w } = of_part.fit.oscillator;
+        let Oscillator { f0, q, m, w } = of_part.oscillator;
         let floor = if w > 0.0 && whole.w > 0.0 { ln(w / whole.w) } else { 0.0 };
         let change = Vector4::new(ln(f0 / whole.f0), ln(q / whole.q), ln(m / whole.m), floor);
         sum += change * change.transpose();

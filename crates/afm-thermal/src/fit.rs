@@ -11,13 +11,13 @@ const MAX_ITERATIONS: usize = 200;
 /// Iterations that compare starts.
 const START_ITERATIONS: usize = 6;
 /// Relative change of all parameters at which the fit has converged.
-const TOLERANCE: f64 = 1e-8;
+const TOLERANCE: f64 = 1e-7;
 /// Largest change of a logarithm in an iteration.
 const MAX_STEP: f64 = 1.0;
 /// Quality factors to start from.
 const START_QUALITIES: [f64; 8] = [0.8, 1.5, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
-/// Most bins with which starts are compared.
-const MAX_START_BINS: usize = 4096;
+/// Starts from which the likelihood is climbed.
+const MAX_STARTS: usize = 5;
 /// A floor below this fraction of the smallest density in the range is not measured.
 const MIN_FLOOR: f64 = 1e-3;
 
@@ -161,7 +161,7 @@ fn climb(
         let reached = log_likelihood(bins, &moved, kernel);
         if reached >= height {
             let is_done = step.amax() < TOLERANCE
-                || (step.amax() < 1e-4 && reached - height < 1e-13 * height.abs());
+                || (step.amax() < 1e-5 && reached - height < 1e-14 * height.abs());
             (oscillator, height) = (moved, reached);
             damping = (damping / 10.0).max(1e-12);
             if is_done {
@@ -197,39 +197,28 @@ pub(crate) fn start(bins: &[Bin], guess: Option<f64>) -> Option<Oscillator> {
             half = 3 * half + 2;
         }
     }
-    let mut best: Option<(Oscillator, f64)> = None;
-    let stride = bins.len().div_ceil(MAX_START_BINS);
-    for f0 in candidates {
-        for q in START_QUALITIES {
-            let is_near = |bin: &&Bin| (bin.frequency - f0).abs() < 0.5 * f0 / q;
-            let near: Vec<f64> = bins.iter().filter(is_near).map(|bin| bin.power).collect();
-            // Narrower than a bin.
-            if near.is_empty() {
-                continue;
-            }
-            let mean = near.iter().sum::<f64>() / near.len() as f64;
-            let started = Oscillator {
-                f0,
-                q,
-                m: (mean - floor).max(0.1 * mean) * std::f64::consts::FRAC_PI_2 * f0 / q,
-                w: floor.max(1e-6 * mean),
-            };
-            // All bins of the peak, and some of the others.
-            let reach = (20.0 * f0 / q).min(0.5 * f0);
-            let kept = |(k, bin): (usize, &Bin)| {
-                let is_kept = k % stride == 0 || (bin.frequency - f0).abs() < reach.min(0.05 * f0);
-                is_kept.then_some(*bin)
-            };
-            let some: Vec<Bin> = bins.iter().enumerate().filter_map(kept).collect();
-            let kernel = Kernel::point();
-            let (reached, _) = climb(&some, started, &kernel, START_ITERATIONS, true);
-            let height = log_likelihood(bins, &reached, &kernel);
-            if height.is_finite() && best.is_none_or(|(_, of_best)| height > of_best) {
-                best = Some((reached, height));
-            }
-        }
-    }
-    best.map(|(oscillator, _)| oscillator)
+    let kernel = Kernel::point();
+    let started = candidates.iter().flat_map(|f0| START_QUALITIES.map(|q| (*f0, q)));
+    let started = started.filter_map(|(f0, q)| {
+        let low = bins.partition_point(|bin| bin.frequency < f0 * (1.0 - 0.5 / q));
+        let high = bins.partition_point(|bin| bin.frequency < f0 * (1.0 + 0.5 / q));
+        // Of a peak between two bins there is no height.
+        let near = bins.get(low..high).filter(|near| !near.is_empty())?;
+        let mean = near.iter().map(|bin| bin.power).sum::<f64>() / near.len() as f64;
+        let oscillator = Oscillator {
+            f0,
+            q,
+            m: (mean - floor).max(0.1 * mean) * std::f64::consts::FRAC_PI_2 * f0 / q,
+            w: floor.max(1e-6 * mean),
+        };
+        Some((oscillator, log_likelihood(bins, &oscillator, &kernel)))
+    });
+    let mut started: Vec<_> = started.filter(|(_, height)| height.is_finite()).collect();
+    started.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let climbed = started.into_iter().take(MAX_STARTS).map(|(oscillator, _)| {
+        climb(bins, oscillator, &kernel, START_ITERATIONS, true)
+    });
+    climbed.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(oscillator, _)| oscillator)
 }
 
 /// Running means over `2 half + 1` values, fewer at the ends.

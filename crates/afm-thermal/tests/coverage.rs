@@ -56,11 +56,18 @@ fn covered(calibrations: &[Calibration], q: f64) -> [usize; 4] {
     let truth = [F0, q, M, floor(q)];
     let mut counts = [0; 4];
     for calibration in calibrations {
-        let floor = calibration.floor.expect("a floor");
-        let all = [calibration.frequency, calibration.quality, calibration.mean_square, floor];
+        let Calibration {
+            frequency,
+            quality,
+            mean_square,
+            floor,
+            ..
+        } = calibration;
+        // A floor that is not found is not covered.
+        let all = [Some(*frequency), Some(*quality), Some(*mean_square), *floor];
         for ((count, estimate), truth) in counts.iter_mut().zip(all).zip(truth) {
-            let [low, high] = estimate.interval;
-            *count += usize::from(low <= truth && truth <= high);
+            let is_covered = estimate.is_some_and(|of| of.interval[0] <= truth && truth <= of.interval[1]);
+            *count += usize::from(is_covered);
         }
     }
     counts

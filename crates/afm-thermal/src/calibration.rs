@@ -11,7 +11,7 @@ use crate::foreign::foreign_peaks;
 use crate::lever::ModeFactor;
 use crate::oscillator::Oscillator;
 use crate::scatter::{BinScatter, robust_averages};
-use crate::spectrum::{Average, Bin, Density, Spectrum, Unit, amplitude_equivalent};
+use crate::spectrum::{Average, Bin, Density, Spectrum, Unit, Window, amplitude_equivalent};
 use crate::{Error, Estimate, Fluid, Plan, ReferenceLever, Warning};
 
 /// Boltzmann's constant, J/K; exact in the SI of 2019.
@@ -28,7 +28,13 @@ const MAX_ROUNDS: usize = 4;
 /// Most foreign peaks that warnings name.
 const MAX_NAMED_PEAKS: usize = 10;
 /// Fractions of the distances from f0 to the ends of the range, whose fits show the spread.
-const PARTS: [[f64; 2]; 5] = [[0.8, 1.0], [1.0, 0.8], [0.8, 0.8], [0.65, 1.0], [0.65, 0.65]];
+const PARTS: [[f64; 2]; 5] = [
+    [0.8, 1.0],
+    [1.0, 0.8],
+    [0.8, 0.8],
+    [0.65, 1.0],
+    [0.65, 0.65],
+];
 /// Standard deviations at which a deviation is reported.
 const SIGNIFICANT: f64 = 4.0;
 /// Relative difference of the two methods that is reported.
@@ -107,7 +113,10 @@ impl Options {
         positive("the factor β/χ²", self.factor.product)?;
         if let Some(sensitivity) = self.sensitivity {
             positive("the sensitivity in m/V", sensitivity.value)?;
-            not_negative("the relative error of the sensitivity", sensitivity.relative_error)?;
+            not_negative(
+                "the relative error of the sensitivity",
+                sensitivity.relative_error,
+            )?;
         }
         if let Some(frequency) = self.frequency {
             positive("the approximate resonance frequency in Hz", frequency)?;
@@ -116,9 +125,19 @@ impl Options {
         require(is_valid, "the tilt in rad", self.tilt, "-1 to 1")?;
         for [low, high] in self.range.iter().chain(&self.exclude) {
             let is_valid = low.is_finite() && *low >= 0.0;
-            require(is_valid, "the lower end of a range in Hz", *low, "a number of at least 0")?;
+            require(
+                is_valid,
+                "the lower end of a range in Hz",
+                *low,
+                "a number of at least 0",
+            )?;
             let is_valid = high > low;
-            require(is_valid, "the upper end of a range in Hz", *high, "more than the lower end")?;
+            require(
+                is_valid,
+                "the upper end of a range in Hz",
+                *high,
+                "more than the lower end",
+            )?;
         }
         Ok(())
     }
@@ -222,13 +241,15 @@ pub fn calibrate(spectrum: &Spectrum, options: &Options) -> Result<Calibration, 
     let mut warnings = Vec::new();
     let (range, fitted) = fit_spectrum(spectrum, options, &mut warnings)?;
     let Fitted { bins, fit, .. } = &fitted;
-    let scatter = BinScatter::new(bins, &fit.ratios);
+    let scatter = BinScatter::new(bins, &fit.ratios, &fit.oscillator);
     let (averages, inflation) = averages(spectrum, bins.len(), scatter, &mut warnings);
     let oscillator = fit.oscillator;
     let spread = spread(spectrum, bins, range, oscillator);
     let is_misfit = is_misfit(bins.len(), scatter.seen, averages, inflation);
     let mut covariance = fit.covariance * (inflation / averages);
     if is_misfit {
+        // Quasi-likelihood: the scatter where it matters replaces that of the averages.
+        covariance *= (averages * fit.weighted_scatter).max(1.0);
         covariance += spread;
         warnings.push(Warning::Misfit {
             difference: (1.0 / scatter.seen - 1.0 / averages).max(0.0).sqrt(),
@@ -403,8 +424,10 @@ fn fit_range(
     let mut fitted = fit(&bins, start, spectrum.window)?;
     for _ in 0..MAX_ROUNDS {
         let local = robust_averages(&bins, &fitted.ratios);
-        let averages = spectrum.effective_averages().map_or(local, |n| n.min(local));
-        let peaks = foreign_peaks(&bins, &fitted.ratios, averages);
+        let averages = spectrum
+            .effective_averages()
+            .map_or(local, |n| n.min(local));
+        let peaks = foreign_peaks(&bins, &fitted.ratios, averages, &fitted.oscillator);
         let masked: usize = peaks.iter().map(|[low, high]| high - low).sum();
         // More than a quarter is not a line in a spectrum but another spectrum.
         if peaks.is_empty() || 4 * masked > bins.len() || bins.len() - masked < MIN_BINS {
@@ -424,7 +447,9 @@ fn fit_range(
         }
         let mut index = 0;
         bins.retain(|_| {
-            let is_kept = !peaks.iter().any(|[low, high]| (*low..*high).contains(&index));
+            let is_kept = !peaks
+                .iter()
+                .any(|[low, high]| (*low..*high).contains(&index));
             index += 1;
             is_kept
         });
@@ -448,7 +473,7 @@ fn averages(
     scatter: BinScatter,
     warnings: &mut Vec<Warning>,
 ) -> (f64, f64) {
-    let inflation = spectrum.window.map_or(scatter.inflation, |of| of.inflation());
+    let inflation = spectrum.window.map_or(scatter.inflation, Window::inflation);
     if spectrum.window.is_none() && inflation > 1.2 {
         warnings.push(Warning::Correlated { inflation });
     }
@@ -462,7 +487,11 @@ fn averages(
     let amplitudes = amplitude_equivalent(stated);
     let raw = spectrum.density == Density::Amplitude && spectrum.average == Average::Powers;
     let mut used = stated;
-    if raw && stated > 20.0 && ln(found / stated) < -2.0 * error && ln(found / amplitudes).abs() < error {
+    if raw
+        && stated > 20.0
+        && ln(found / stated) < -2.0 * error
+        && ln(found / amplitudes).abs() < 2.0 * error
+    {
         warnings.push(Warning::LooksLikeAmplitudes { stated, found });
         used = found;
     } else if found < stated && is_far(stated) {
@@ -497,7 +526,11 @@ fn spread(
             continue;
         };
         let Oscillator { f0, q, m, w } = of_part.oscillator;
-        let floor = if w > 0.0 && whole.w > 0.0 { ln(w / whole.w) } else { 0.0 };
+        let floor = if w > 0.0 && whole.w > 0.0 {
+            ln(w / whole.w)
+        } else {
+            0.0
+        };
         let change = Vector4::new(ln(f0 / whole.f0), ln(q / whole.q), ln(m / whole.m), floor);
         sum += change * change.transpose();
         count += 1.0;
@@ -538,7 +571,11 @@ fn doubts(bins: &[Bin], fit: &Fit, range: [f64; 2]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let peak = fit.oscillator.width();
     let is_near = |bin: &&Bin| (bin.frequency - f0).abs() < peak.max(0.05 * f0);
-    let bin = bins.iter().filter(is_near).map(|bin| bin.width).fold(0.0, f64::max);
+    let bin = bins
+        .iter()
+        .filter(is_near)
+        .map(|bin| bin.width)
+        .fold(0.0, f64::max);
     if 4.0 * bin > peak {
         warnings.push(Warning::WideBins { bin, peak });
     }

@@ -4,7 +4,9 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The lists of frequencies and values have different lengths.
-    #[error("{frequencies} frequencies and {values} values; a spectrum needs one value per frequency")]
+    #[error(
+        "{frequencies} frequencies and {values} values; a spectrum needs one value per frequency"
+    )]
     Lengths {
         /// Number of frequencies.
         frequencies: usize,

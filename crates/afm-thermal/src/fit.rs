@@ -30,6 +30,8 @@ pub(crate) struct Fit {
     pub(crate) covariance: Matrix4<f64>,
     /// P/S of each bin.
     pub(crate) ratios: Vec<f64>,
+    /// Mean of (P/S − 1)² weighted by the information of each bin.
+    pub(crate) weighted_scatter: f64,
     /// Whether the white floor is above zero.
     pub(crate) has_floor: bool,
 }
@@ -71,11 +73,22 @@ pub(crate) fn fit(bins: &[Bin], start: Oscillator, window: Option<Window>) -> Op
     let is_valid = [oscillator.f0, oscillator.q, oscillator.m]
         .iter()
         .all(|value| value.is_finite() && *value > 0.0);
-    let ratio = |bin: &Bin| bin.power / oscillator.in_bin(bin, &kernel).0;
-    is_valid.then(|| Fit {
+    let (mut squares, mut weights) = (0.0, 0.0);
+    let ratio = |bin: &Bin| {
+        let (s, derivatives) = oscillator.in_bin(bin, &kernel);
+        let ratio = bin.power / s;
+        let derivatives = Vector4::from(derivatives) / s;
+        let weight = derivatives.dot(&(covariance * derivatives));
+        squares += weight * bin.ordinates * (ratio - 1.0) * (ratio - 1.0);
+        weights += weight;
+        ratio
+    };
+    let ratios = bins.iter().map(ratio).collect();
+    is_valid.then_some(Fit {
         oscillator,
         covariance,
-        ratios: bins.iter().map(ratio).collect(),
+        ratios,
+        weighted_scatter: squares / weights,
         has_floor,
     })
 }
@@ -93,7 +106,7 @@ fn kernel_of(bins: &[Bin], oscillator: &Oscillator, window: Option<Window>) -> K
     )
 }
 
-/// Log-likelihood with its gradient and Fisher's information.
+/// Gradient of the log-likelihood, and Fisher's information.
 struct Scores {
     gradient: Vector4<f64>,
     information: Matrix4<f64>,
@@ -198,7 +211,9 @@ pub(crate) fn start(bins: &[Bin], guess: Option<f64>) -> Option<Oscillator> {
         }
     }
     let kernel = Kernel::point();
-    let started = candidates.iter().flat_map(|f0| START_QUALITIES.map(|q| (*f0, q)));
+    let started = candidates
+        .iter()
+        .flat_map(|f0| START_QUALITIES.map(|q| (*f0, q)));
     let started = started.filter_map(|(f0, q)| {
         let low = bins.partition_point(|bin| bin.frequency < f0 * (1.0 - 0.5 / q));
         let high = bins.partition_point(|bin| bin.frequency < f0 * (1.0 + 0.5 / q));
@@ -215,10 +230,13 @@ pub(crate) fn start(bins: &[Bin], guess: Option<f64>) -> Option<Oscillator> {
     });
     let mut started: Vec<_> = started.filter(|(_, height)| height.is_finite()).collect();
     started.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let climbed = started.into_iter().take(MAX_STARTS).map(|(oscillator, _)| {
-        climb(bins, oscillator, &kernel, START_ITERATIONS, true)
-    });
-    climbed.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(oscillator, _)| oscillator)
+    let climbed = started
+        .into_iter()
+        .take(MAX_STARTS)
+        .map(|(oscillator, _)| climb(bins, oscillator, &kernel, START_ITERATIONS, true));
+    climbed
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(oscillator, _)| oscillator)
 }
 
 /// Running means over `2 half + 1` values, fewer at the ends.

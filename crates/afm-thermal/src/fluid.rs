@@ -38,7 +38,12 @@ impl Fluid {
     /// If the temperature is not between 100 and 1900 K.
     pub fn air(temperature: f64) -> Result<Self, Error> {
         let is_valid = (100.0..=1900.0).contains(&temperature);
-        require(is_valid, "the temperature of air in K", temperature, "100 to 1900")?;
+        require(
+            is_valid,
+            "the temperature of air in K",
+            temperature,
+            "100 to 1900",
+        )?;
         let ratio = temperature / 273.0;
         Ok(Self {
             density: 101_325.0 / (287.055 * temperature),
@@ -54,10 +59,14 @@ impl Fluid {
     pub fn water(temperature: f64) -> Result<Self, Error> {
         let t = temperature - CELSIUS;
         let is_valid = (0.0..=100.0).contains(&t);
-        require(is_valid, "the temperature of water in K", temperature, "273.15 to 373.15")?;
+        require(
+            is_valid,
+            "the temperature of water in K",
+            temperature,
+            "273.15 to 373.15",
+        )?;
         let c = 20.0 - t;
-        let decades = c / (t + 96.0)
-            * (1.2364 - 1.37e-3 * c + 5.7e-6 * c * c);
+        let decades = c / (t + 96.0) * (1.2364 - 1.37e-3 * c + 5.7e-6 * c * c);
         let expansion = (t + 288.9414) / (508_929.2 * (t + 68.12963)) * (t - 3.9863) * (t - 3.9863);
         Ok(Self {
             density: 1000.0 * (1.0 - expansion),
@@ -170,12 +179,17 @@ mod tests {
     /// J. Thermophys. 25, 21 (2004), at 300 K.
     #[test]
     fn air_and_water() {
-        for (celsius, density, viscosity) in
-            [(20.0, 998.21, 1.0016e-3), (25.0, 997.05, 0.8900e-3), (40.0, 992.22, 0.6527e-3)]
-        {
+        for (celsius, density, viscosity) in [
+            (20.0, 998.21, 1.0016e-3),
+            (25.0, 997.05, 0.8900e-3),
+            (40.0, 992.22, 0.6527e-3),
+        ] {
             let water = Fluid::water(CELSIUS + celsius).unwrap();
             assert!((water.density / density - 1.0).abs() < 3e-4, "{water:?}");
-            assert!((water.viscosity / viscosity - 1.0).abs() < 3e-3, "{water:?}");
+            assert!(
+                (water.viscosity / viscosity - 1.0).abs() < 3e-3,
+                "{water:?}"
+            );
         }
         let air = Fluid::air(300.0).unwrap();
         assert!((air.density / 1.1770 - 1.0).abs() < 1e-3, "{air:?}");

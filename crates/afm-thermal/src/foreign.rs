@@ -2,6 +2,7 @@
 
 use nanotap_arithmetic::ln;
 
+use crate::oscillator::Oscillator;
 use crate::spectrum::Bin;
 
 /// Bins on each side whose median is the level around a bin.
@@ -11,8 +12,28 @@ const FALSE_ALARM: f64 = 1e-3;
 /// Bins next to a peak that a window fills too.
 const MARGIN: usize = 2;
 
-/// Runs of bins that are higher than the noise around them can be: index ranges with a margin.
-pub(crate) fn foreign_peaks(bins: &[Bin], ratios: &[f64], averages: f64) -> Vec<[usize; 2]> {
+/// Widths f0/Q around f0 in which the spectrum may differ from the fit because the resonance drifted.
+const RESONANCE: f64 = 3.0;
+/// Height over bins 3 to 5 away that only a line has there.
+const LINE: f64 = 3.0;
+
+/// Runs of bins that are higher than the noise around them can be: index ranges with a margin. The
+/// resonance itself is none, even where it differs from the fit.
+pub(crate) fn foreign_peaks(
+    bins: &[Bin],
+    ratios: &[f64],
+    averages: f64,
+    oscillator: &Oscillator,
+) -> Vec<[usize; 2]> {
+    let is_line = |k: usize| {
+        let near = (3..=5)
+            .flat_map(|d| [k.checked_sub(d), Some(k + d)])
+            .flatten();
+        let highest = near
+            .filter_map(|k| ratios.get(k).copied())
+            .fold(0.0, f64::max);
+        ratios[k] > LINE * highest
+    };
     let threshold = ln(FALSE_ALARM / bins.len() as f64);
     let mut peaks: Vec<[usize; 2]> = Vec::new();
     let mut around = Vec::with_capacity(2 * HALF_WINDOW + 1);
@@ -30,7 +51,9 @@ pub(crate) fn foreign_peaks(bins: &[Bin], ratios: &[f64], averages: f64) -> Vec<
         let level = *median / median_of_gamma(n);
         let x = ratios[k] / level;
         // Chernoff's bound of the tail of a gamma variable with mean 1: e^{−n(x − 1 − ln x)}.
-        if x.is_finite() && x > 1.0 && -n * (x - 1.0 - ln(x)) < threshold {
+        let is_high = x.is_finite() && x > 1.0 && -n * (x - 1.0 - ln(x)) < threshold;
+        let in_resonance = (bin.frequency - oscillator.f0).abs() < RESONANCE * oscillator.width();
+        if is_high && (!in_resonance || is_line(k)) {
             let run = [k.saturating_sub(MARGIN), (k + MARGIN + 1).min(bins.len())];
             match peaks.last_mut() {
                 Some(last) if last[1] >= run[0] => last[1] = run[1],

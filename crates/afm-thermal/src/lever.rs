@@ -45,7 +45,12 @@ impl ModeFactor {
     /// If `spot` is not above 0 and at most 1.
     pub fn at_spot(spot: f64) -> Result<Self, Error> {
         let is_valid = spot > 0.0 && spot <= 1.0;
-        require(is_valid, "the position of the light spot", spot, "a fraction above 0, at most 1")?;
+        require(
+            is_valid,
+            "the position of the light spot",
+            spot,
+            "a fraction above 0, at most 1",
+        )?;
         Ok(Self::new(static_ratio(), slope_ratio(spot)))
     }
 
@@ -83,7 +88,9 @@ mod tests {
         assert!((factor.beta - 0.970_688).abs() < 1e-6);
         assert!((factor.chi - 1.5 / 1.376_506).abs() < 1e-6);
         assert!((factor.product - 0.817_435).abs() < 1e-6);
-        assert!((nanotap_arithmetic::cos(ALPHA) * nanotap_arithmetic::cosh(ALPHA) + 1.0).abs() < 1e-14);
+        assert!(
+            (nanotap_arithmetic::cos(ALPHA) * nanotap_arithmetic::cosh(ALPHA) + 1.0).abs() < 1e-14
+        );
     }
 
     #[test]

@@ -12,8 +12,8 @@
 //!     let shape = 1.0 / ((1.0 - r * r).powi(2) + (r / 150.0).powi(2));
 //!     2.0 * m / (std::f64::consts::PI * 75e3 * 150.0) * shape + 1e-27
 //! };
-//! let power = frequency.iter().map(density).collect();
-//! let spectrum = Spectrum::new(frequency, power, Density::Power, Unit::Metre)?
+//! let power: Vec<f64> = frequency.iter().map(density).collect();
+//! let spectrum = Spectrum::new(&frequency, &power, Density::Power, Unit::Metre)?
 //!     .with_averages(100.0, Average::Powers)?;
 //! let calibration = calibrate(&spectrum, &Options::default())?;
 //! let k = calibration.stiffness.unwrap();

@@ -137,7 +137,10 @@ mod tests {
                 .map(|k| {
                     let t = 0.5 * PI * (f64::from(k) + 0.5) / f64::from(n);
                     let tangent = nanotap_arithmetic::tan(t);
-                    0.5 * PI * (1.0 + tangent * tangent) * density(5.0 * tangent, 5.0, q, 3.0, 0.0) * 5.0
+                    0.5 * PI
+                        * (1.0 + tangent * tangent)
+                        * density(5.0 * tangent, 5.0, q, 3.0, 0.0)
+                        * 5.0
                 })
                 .sum();
             assert!((sum / f64::from(n) - 3.0).abs() < 1e-6, "{q}: {sum}");
@@ -160,7 +163,10 @@ mod tests {
             for (k, exact) in gradient.into_iter().enumerate() {
                 let found = (moved(k, 1.0) - moved(k, -1.0)) / (2.0 * step);
                 let scale = OSCILLATOR.in_bin(&bin, &kernel).0;
-                assert!((found - exact).abs() < 1e-7 * scale, "{f} {k}: {found} {exact}");
+                assert!(
+                    (found - exact).abs() < 1e-7 * scale,
+                    "{f} {k}: {found} {exact}"
+                );
             }
         }
     }

@@ -1,9 +1,15 @@
 //! How the ordinates of a spectrum scatter: around the oscillator, and from one to the next.
 
+use crate::oscillator::Oscillator;
 use crate::spectrum::Bin;
 
 /// Bins between the ordinates of a difference that no common window correlates.
 const FAR: usize = 3;
+
+/// Widths f0/Q around f0 whose differences are left out: a peak that drifted is not smooth.
+const RESONANCE: f64 = 3.0;
+/// Fewest differences without the resonance.
+const MIN_DIFFERENCES: usize = 200;
 
 /// Scatter of P/S of the bins in a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,17 +25,31 @@ pub(crate) struct BinScatter {
 impl BinScatter {
     /// From P/S of these bins; a difference xₖ₋ₗ − 2xₖ + xₖ₊ₗ of ordinates with variance σ² has the
     /// variance σ² (6 − 8 ρₗ² + 2 ρ₂ₗ²).
-    pub(crate) fn new(bins: &[Bin], ratios: &[f64]) -> Self {
+    pub(crate) fn new(bins: &[Bin], ratios: &[f64], oscillator: &Oscillator) -> Self {
         let squares = bins.iter().zip(ratios);
         let of_fit = squares.map(|(bin, u)| bin.ordinates * (u - 1.0) * (u - 1.0));
         let seen = 1.0 / mean(of_fit);
+        let is_far = |k: &usize| {
+            let distance = (bins[*k].frequency - oscillator.f0).abs();
+            distance > RESONANCE * oscillator.width()
+        };
+        let all = FAR..bins.len().saturating_sub(FAR);
+        let far: Vec<usize> = all.clone().filter(is_far).collect();
+        let inner = if far.len() < MIN_DIFFERENCES {
+            all.collect()
+        } else {
+            far
+        };
         let of_lag = |lag: usize| {
-            let inner = lag..bins.len().saturating_sub(lag);
-            mean(inner.map(|k| square_of_difference(bins, ratios, k, lag)))
+            mean(
+                inner
+                    .iter()
+                    .map(|k| square_of_difference(bins, ratios, *k, lag)),
+            )
         };
         let variance = of_lag(FAR);
         // Correlations within the noise of their estimate are taken as none.
-        let noise = 3.0 / (bins.len() as f64).sqrt();
+        let noise = 3.0 / (inner.len() as f64).sqrt();
         let significant = |r: f64| if r > noise { r.min(1.0) } else { 0.0 };
         let second = significant(0.75 * (1.0 - of_lag(2) / variance));
         let first = significant(0.75 * (1.0 - of_lag(1) / variance) + 0.25 * second);
@@ -47,7 +67,9 @@ pub(crate) fn robust_averages(bins: &[Bin], ratios: &[f64]) -> f64 {
     /// Median of the square of a standard normal variable.
     const MEDIAN: f64 = 0.454_936;
     let inner = FAR..bins.len().saturating_sub(FAR);
-    let mut squares: Vec<f64> = inner.map(|k| square_of_difference(bins, ratios, k, FAR)).collect();
+    let mut squares: Vec<f64> = inner
+        .map(|k| square_of_difference(bins, ratios, k, FAR))
+        .collect();
     if squares.is_empty() {
         return 1.0;
     }

@@ -155,8 +155,8 @@ impl Spectrum {
     /// If the lists have different lengths or more than [`MAX_BINS`] entries, the frequencies do not
     /// ascend, or a density is negative or not finite.
     pub fn new(
-        frequency: Vec<f64>,
-        values: Vec<f64>,
+        frequency: &[f64],
+        values: &[f64],
         density: Density,
         unit: Unit,
     ) -> Result<Self, Error> {
@@ -174,7 +174,7 @@ impl Spectrum {
             });
         }
         let mut previous = f64::NEG_INFINITY;
-        for (index, (&f, &value)) in frequency.iter().zip(&values).enumerate() {
+        for (index, (&f, &value)) in frequency.iter().zip(values).enumerate() {
             if !(f.is_finite() && f >= 0.0 && f > previous) {
                 return Err(Error::Frequencies {
                     index,
@@ -212,7 +212,7 @@ impl Spectrum {
                 ordinates: if ratio < 1.2 { 1.0 } else { ratio },
             }
         };
-        let all = frequency.iter().zip(&values).enumerate().map(bin);
+        let all = frequency.iter().zip(values).enumerate().map(bin);
         Ok(Self {
             bins: all.filter(|bin| bin.frequency > 0.0).collect(),
             unit,
@@ -233,7 +233,12 @@ impl Spectrum {
     /// If the number is not finite or below 1.
     pub fn with_averages(mut self, averages: f64, average: Average) -> Result<Self, Error> {
         let is_valid = averages.is_finite() && averages >= 1.0;
-        require(is_valid, "the number of averages", averages, "a number of at least 1")?;
+        require(
+            is_valid,
+            "the number of averages",
+            averages,
+            "a number of at least 1",
+        )?;
         self.averages = Some(averages);
         Ok(self.averaged(average, averages))
     }
@@ -350,7 +355,7 @@ mod tests {
     fn a_logarithmic_axis_has_means_and_a_gap_has_none() {
         let of = |frequency: &[f64]| {
             let values = vec![1.0; frequency.len()];
-            let spectrum = Spectrum::new(frequency.to_vec(), values, Density::Power, Unit::Volt);
+            let spectrum = Spectrum::new(frequency, &values, Density::Power, Unit::Volt);
             let bins = spectrum.unwrap().bins;
             bins.iter().map(|bin| bin.ordinates).collect::<Vec<_>>()
         };
@@ -360,12 +365,13 @@ mod tests {
 
     #[test]
     fn faulty_spectra_are_refused() {
-        let new = |f: &[f64], p: &[f64]| {
-            Spectrum::new(f.to_vec(), p.to_vec(), Density::Power, Unit::Volt)
-        };
+        let new = |f: &[f64], p: &[f64]| Spectrum::new(f, p, Density::Power, Unit::Volt);
         assert!(matches!(new(&[1.0], &[]), Err(Error::Lengths { .. })));
         let descending = new(&[1.0, 1.0], &[1.0, 1.0]);
-        assert!(matches!(descending, Err(Error::Frequencies { index: 1, .. })));
+        assert!(matches!(
+            descending,
+            Err(Error::Frequencies { index: 1, .. })
+        ));
         let negative = new(&[1.0, 2.0], &[1.0, -1.0]);
         assert!(matches!(negative, Err(Error::Value { .. })));
         assert!(new(&[0.0, 1.0], &[f64::NAN, 1.0]).is_ok());

@@ -4,10 +4,10 @@
 use nalgebra::Complex;
 use nanotap_arithmetic::cos;
 
+use crate::Error;
 use crate::error::{positive, require};
 use crate::fft::transform;
 use crate::spectrum::{Average, Density, MAX_BINS, Spectrum, Unit, Window};
-use crate::Error;
 
 /// Most samples of a record.
 pub const MAX_SAMPLES: usize = 1 << 26;
@@ -89,11 +89,10 @@ pub fn welch(
     let correlation = (product / energy) * (product / energy);
     let effective = count / (1.0 + 2.0 * correlation * (1.0 - 1.0 / count));
     let frequency = (1..length / 2).map(|k| rate * k as f64 / length as f64);
-    Ok(
-        Spectrum::new(frequency.collect(), powers, Density::Power, unit)?
-            .with_averages(effective.max(1.0), Average::Powers)?
-            .with_window(window),
-    )
+    let frequency: Vec<f64> = frequency.collect();
+    Ok(Spectrum::new(&frequency, &powers, Density::Power, unit)?
+        .with_averages(effective.max(1.0), Average::Powers)?
+        .with_window(window))
 }
 
 fn segment_length(samples: usize, requested: Option<usize>) -> Result<usize, Error> {
@@ -101,7 +100,12 @@ fn segment_length(samples: usize, requested: Option<usize>) -> Result<usize, Err
         Some(length) => {
             let is_valid = (MIN_SEGMENT..=samples.min(2 * MAX_BINS)).contains(&length);
             let name = "the number of samples in a segment";
-            require(is_valid, name, length as f64, "64 to the length of the record")?;
+            require(
+                is_valid,
+                name,
+                length as f64,
+                "64 to the length of the record",
+            )?;
             length
         }
         None => (samples / 8).clamp(MIN_SEGMENT, MAX_CHOSEN_SEGMENT),
@@ -171,8 +175,14 @@ mod tests {
     #[test]
     fn faulty_records_are_refused() {
         let of = |record: &[f64], rate| welch(record, rate, Unit::Volt, &WelchOptions::default());
-        assert!(matches!(of(&[0.0; 10], 1e3), Err(Error::ShortRecord { .. })));
-        assert!(matches!(of(&[f64::NAN; 100], 1e3), Err(Error::Sample { index: 0, .. })));
+        assert!(matches!(
+            of(&[0.0; 10], 1e3),
+            Err(Error::ShortRecord { .. })
+        ));
+        assert!(matches!(
+            of(&[f64::NAN; 100], 1e3),
+            Err(Error::Sample { index: 0, .. })
+        ));
         assert!(matches!(of(&[0.0; 100], 0.0), Err(Error::Option { .. })));
     }
 }

@@ -3,8 +3,8 @@
 //! 0.026 (binomial distribution).
 
 use afm_thermal::{
-    Average, Calibration, Density, Options, Spectrum, Unit, WelchOptions, Window, calibrate, density,
-    welch,
+    Average, Calibration, Density, Options, Spectrum, Unit, WelchOptions, Window, calibrate,
+    density, welch,
 };
 
 const F0: f64 = 70e3;
@@ -66,7 +66,8 @@ fn covered(calibrations: &[Calibration], q: f64) -> [usize; 4] {
         // A floor that is not found is not covered.
         let all = [Some(*frequency), Some(*quality), Some(*mean_square), *floor];
         for ((count, estimate), truth) in counts.iter_mut().zip(all).zip(truth) {
-            let is_covered = estimate.is_some_and(|of| of.interval[0] <= truth && truth <= of.interval[1]);
+            let is_covered =
+                estimate.is_some_and(|of| of.interval[0] <= truth && truth <= of.interval[1]);
             *count += usize::from(is_covered);
         }
     }
@@ -75,30 +76,45 @@ fn covered(calibrations: &[Calibration], q: f64) -> [usize; 4] {
 
 fn check(name: &str, calibrations: &[Calibration], q: f64) {
     let counts = covered(calibrations, q);
-    let misfits = calibrations.iter().filter(|of| of.scatter.is_misfit).count();
+    let misfits = calibrations
+        .iter()
+        .filter(|of| of.scatter.is_misfit)
+        .count();
     let foreign: usize = calibrations.iter().map(|of| of.warnings.len()).sum();
-    println!("{name}: {counts:?} of {}, {misfits} misfits, {foreign} warnings", calibrations.len());
+    println!(
+        "{name}: {counts:?} of {}, {misfits} misfits, {foreign} warnings",
+        calibrations.len()
+    );
     assert_eq!(calibrations.len(), 200);
-    assert!(counts.iter().all(|count| (180..=197).contains(count)), "{name}: {counts:?}");
+    assert!(
+        counts.iter().all(|count| (180..=197).contains(count)),
+        "{name}: {counts:?}"
+    );
     // Four standard deviations.
     assert!(misfits <= 4, "{name}: {misfits} misfits");
 }
 
-/// 200 spectra from 0.3 f0 to 2.2 f0 whose ordinates are independent.
+/// 200 spectra whose ordinates are independent, from 0.2 f0 to 2.5 f0, or 50 widths around f0.
 fn spectra(q: f64, averages: u32, step: f64, seed: u64) -> Vec<Calibration> {
     let mut random = Random::new(seed);
+    let ends = [
+        (1.0 - 50.0 / q).max(0.2) * F0,
+        (1.0 + 50.0 / q).min(2.5) * F0,
+    ];
     let frequency: Vec<f64> = (1..)
         .map(|k| f64::from(k) * step)
-        .skip_while(|f| *f < 0.2 * F0)
-        .take_while(|f| *f < 2.5 * F0)
+        .skip_while(|f| *f < ends[0])
+        .take_while(|f| *f < ends[1])
         .collect();
     let one = |_| {
-        let power = frequency.iter().map(|f| density(*f, F0, q, M, floor(q)) * random.gamma(averages));
-        let spectrum =
-            Spectrum::new(frequency.clone(), power.collect(), Density::Power, Unit::Metre)
-                .and_then(|of| of.with_averages(f64::from(averages), Average::Powers))
-                .expect("a spectrum")
-                .with_window(Window::None);
+        let power: Vec<f64> = frequency
+            .iter()
+            .map(|f| density(*f, F0, q, M, floor(q)) * random.gamma(averages))
+            .collect();
+        let spectrum = Spectrum::new(&frequency, &power, Density::Power, Unit::Metre)
+            .and_then(|of| of.with_averages(f64::from(averages), Average::Powers))
+            .expect("a spectrum")
+            .with_window(Window::None);
         calibrate(&spectrum, &Options::default()).expect("a calibration")
     };
     (0..200).map(one).collect()
@@ -143,12 +159,22 @@ fn records(q: f64, window: Window, seed: u64) -> Vec<Calibration> {
     let shrink = nanotap_arithmetic::exp(-decay * dt);
     // The propagator of (x, v), v in units of ω.
     let a = [
-        [shrink * (cos + decay / damped * sin), shrink * omega / damped * sin],
-        [-shrink * omega / damped * sin, shrink * (cos - decay / damped * sin)],
+        [
+            shrink * (cos + decay / damped * sin),
+            shrink * omega / damped * sin,
+        ],
+        [
+            -shrink * omega / damped * sin,
+            shrink * (cos - decay / damped * sin),
+        ],
     ];
     // The covariance of the noise keeps ⟨x²⟩ = ⟨v²⟩ = M stationary: C − A C Aᵀ.
     let product = |i: usize, j: usize| a[i][0] * a[j][0] + a[i][1] * a[j][1];
-    let noise = [M * (1.0 - product(0, 0)), -M * product(0, 1), M * (1.0 - product(1, 1))];
+    let noise = [
+        M * (1.0 - product(0, 0)),
+        -M * product(0, 1),
+        M * (1.0 - product(1, 1)),
+    ];
     let l00 = noise[0].sqrt();
     let l10 = noise[1] / l00;
     let l11 = (noise[2] - l10 * l10).max(0.0).sqrt();

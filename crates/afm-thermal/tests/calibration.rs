@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use afm_thermal::{
-    Average, BOLTZMANN, Calibration, Density, Error, Fluid, ModeFactor, Options, Plan,
-    ReferenceLever, Sensitivity, Spectrum, Unit, Warning, calibrate, density,
+    Average, BOLTZMANN, Density, Error, Fluid, ModeFactor, Options, Plan, ReferenceLever,
+    Sensitivity, Spectrum, Unit, Warning, calibrate, density,
 };
 
 const F0: f64 = 75e3;

@@ -96,6 +96,20 @@ fn check(name: &str, calibrations: &[Calibration], q: f64) {
 
 /// 200 spectra whose ordinates are independent, from 0.2 f0 to 2.5 f0, or 50 widths around f0.
 fn spectra(q: f64, averages: u32, step: f64, seed: u64) -> Vec<Calibration> {
+    calibrations(q, averages, step, seed, |spectrum| {
+        let spectrum = spectrum.with_averages(f64::from(averages), Average::Powers);
+        spectrum.expect("a spectrum").with_window(Window::None)
+    })
+}
+
+/// The same with what is stated about the averages.
+fn calibrations(
+    q: f64,
+    averages: u32,
+    step: f64,
+    seed: u64,
+    stated: impl Fn(Spectrum) -> Spectrum,
+) -> Vec<Calibration> {
     let mut random = Random::new(seed);
     let ends = [
         (1.0 - 50.0 / q).max(0.2) * F0,
@@ -111,10 +125,8 @@ fn spectra(q: f64, averages: u32, step: f64, seed: u64) -> Vec<Calibration> {
             .iter()
             .map(|f| density(*f, F0, q, M, floor(q)) * random.gamma(averages))
             .collect();
-        let spectrum = Spectrum::new(&frequency, &power, Density::Power, Unit::Metre)
-            .and_then(|of| of.with_averages(f64::from(averages), Average::Powers))
-            .expect("a spectrum")
-            .with_window(Window::None);
+        let spectrum = Spectrum::new(&frequency, &power, Density::Power, Unit::Metre);
+        let spectrum = stated(spectrum.expect("a spectrum"));
         calibrate(&spectrum, &Options::default()).expect("a calibration")
     };
     (0..200).map(one).collect()
@@ -128,6 +140,13 @@ fn in_liquid_one_periodogram() {
 #[test]
 fn in_liquid_many_averages() {
     check("Q 2, n 100", &spectra(2.0, 100, 175.0, 2), 2.0);
+}
+
+/// The number of averages follows from the scatter.
+#[test]
+fn in_liquid_without_the_number_of_averages() {
+    let calibrations = calibrations(2.0, 100, 175.0, 8, |spectrum| spectrum);
+    check("Q 2, n unknown", &calibrations, 2.0);
 }
 
 #[test]

@@ -49,10 +49,11 @@ fn close(found: f64, expected: f64, tolerance: f64) {
 }
 
 fn report(name: &str, calibration: &Calibration) {
-    println!(
-        "{name}: {}",
-        serde_json::to_string_pretty(calibration).unwrap()
-    );
+    let [k, q] = [calibration.stiffness.unwrap(), calibration.quality].map(|of| of.interval);
+    println!("{name}: k {k:?} N/m, Q {q:?}");
+    for warning in &calibration.warnings {
+        println!("    {warning}");
+    }
 }
 
 /// Nanosurf's example: 1000 averages of amplitudes. An independent fit in Python by the same

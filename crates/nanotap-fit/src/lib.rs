@@ -9,6 +9,7 @@
     )
 )]
 
+pub mod calibrate;
 pub mod figure;
 pub mod files;
 pub mod fit;

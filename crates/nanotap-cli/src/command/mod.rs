@@ -5,6 +5,7 @@ mod attractors;
 mod basin;
 mod bimodal;
 mod branch;
+mod calibrate;
 mod case;
 mod catalogue;
 mod contact_laws;
@@ -133,6 +134,8 @@ pub(crate) enum Own {
     Scan(scan::Arguments),
     /// List what the files of instruments hold
     Files(files::Arguments),
+    /// Calibrate a lever from its thermal noise: k, Q, f0, sensitivity
+    Calibrate(Box<calibrate::Arguments>),
     /// Fit parameters of lever and sample to measured curves
     Fit(fit::Arguments),
     /// Reconstruct force and dissipation against distance from a measured curve
@@ -185,6 +188,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Bimodal(arguments) => bimodal::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
         Own::Files(arguments) => files::run(arguments, output),
+        Own::Calibrate(arguments) => calibrate::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Reconstruct(arguments) => reconstruct::run(arguments, output),
         Own::Sweep(arguments) => sweep::run(arguments, output),

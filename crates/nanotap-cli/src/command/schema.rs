@@ -5,6 +5,7 @@ use nanotap::case::schema;
 use nanotap::dataset::Merged;
 use nanotap::files::FileList;
 use nanotap::study::DatasetStudy;
+use nanotap::study::calibrate::CalibrateReport;
 use nanotap::study::fit::FitMap;
 use nanotap::study::registry::{STUDIES, StudyEntry};
 use nanotap::study::request::answer_schema;
@@ -38,6 +39,11 @@ const COMMANDS: &[Described] = &[
         "files",
         "List what the files of instruments hold",
         answer_schema::<FileList>,
+    ),
+    (
+        "calibrate",
+        "Calibrate a lever from its thermal noise: k, Q, f0, sensitivity",
+        answer_schema::<CalibrateReport>,
     ),
     (
         "merge",

@@ -1,5 +1,6 @@
 //! The figures of these studies.
 
+pub mod calibrate;
 pub mod files;
 pub mod fit;
 pub mod reconstruct;

@@ -3,7 +3,7 @@
 
 pub mod registry;
 
-pub use nanotap_fit::{fit, reconstruct};
+pub use nanotap_fit::{calibrate, fit, reconstruct};
 pub use nanotap_motions::simulate::fixed_step;
 pub use nanotap_motions::{
     approach, attractors, branch, event, frequency_modulation, lyapunov, orbit, proof, setpoint,

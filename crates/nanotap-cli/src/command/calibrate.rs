@@ -1,0 +1,174 @@
+//! `nanotap calibrate`: a lever from its thermal noise.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nanotap::case::physical::Kind;
+use nanotap::study::calibrate::{
+    CalibrateOptions, CalibrateReport, Calibration, Estimate, Unit, calibrate_file,
+};
+
+use crate::arguments::{OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::request::Request;
+use crate::table::{Align, Table};
+use crate::{motion, number, style};
+
+/// Calibrate a lever from its thermal noise: k, Q, f0, sensitivity.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// A spectrum or a record of the deflection: an instrument's file (JPK .tnd, Nanosurf thermal .nid, a
+    /// curve with a pause), or a table as text with columns such as `frequency (kHz)` and `PSD (pm^2/Hz)`, or
+    /// `time (s)` and `deflection (V)`
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+
+    #[command(flatten)]
+    request: Request<CalibrateOptions>,
+
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let options = arguments.request.read()?;
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    let report = calibrate_file(&arguments.file, &options)?;
+    arguments.out.write(|| report.csv())?;
+    arguments.plot.draw(|| report.figure())?;
+    output.notes(&report.notes);
+    for warning in &report.calibration.warnings {
+        output.warning(&warning.to_string());
+    }
+    output.result(&report, text)
+}
+
+fn text(report: &CalibrateReport) -> String {
+    let calibration = &report.calibration;
+    let heading = format!(
+        "{}: thermal calibration of `{}`",
+        report.source, report.name
+    );
+    let mut text = format!(
+        "{}\n\n{}\n",
+        style::bold(&heading),
+        table(calibration).render()
+    );
+    let mut say = |words: String| text.push_str(&motion::paragraph(&words));
+    say(factors(calibration));
+    say(format!(
+        "fit of {} from {} to {}; scatter of {} averages{}",
+        number::counted(calibration.bins, "bin", "bins"),
+        Kind::Frequency.format(calibration.range[0]),
+        Kind::Frequency.format(calibration.range[1]),
+        number::significant(calibration.scatter.averages, 3),
+        if calibration.scatter.inflation > 1.0 {
+            format!(
+                ", variances enlarged by {} for correlated bins",
+                number::significant(calibration.scatter.inflation, 3)
+            )
+        } else {
+            String::new()
+        }
+    ));
+    text.push_str(&format!("\n{}", report.cantilever));
+    text
+}
+
+/// The estimates with their 95 % intervals.
+fn table(calibration: &Calibration) -> Table {
+    let mut table = Table::new([
+        ("", Align::Left),
+        ("estimate", Align::Left),
+        ("error", Align::Right),
+        ("95 % interval", Align::Left),
+    ]);
+    let mut row = |name: &str, estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
+        let [low, high] = estimate.interval;
+        let percent = number::significant(100.0 * estimate.relative_error, 2);
+        table.row([
+            name.to_owned(),
+            shown(estimate.value),
+            format!("{percent} %"),
+            format!("{} to {}", shown(low), shown(high)),
+        ]);
+    };
+    let stiffness = |value: f64| Kind::Stiffness.format(value);
+    let in_volts = calibration.unit == Unit::Volt;
+    if let Some(k) = &calibration.stiffness {
+        row("spring constant k", k, &stiffness);
+    }
+    if let Some(k) = &calibration.stiffness_along_normal {
+        row("k along the sample's normal", k, &stiffness);
+    }
+    if let Some(sader) = &calibration.sader {
+        row("k by Sader's method", &sader.stiffness, &stiffness);
+    }
+    row("resonance f0", &calibration.frequency, &|value| {
+        Kind::Frequency.format_digits(value, 6)
+    });
+    row("quality factor Q", &calibration.quality, &|value| {
+        number::significant(value, 4)
+    });
+    if let Some(sensitivity) = &calibration.sensitivity {
+        row("sensitivity (InvOLS)", sensitivity, &|value| {
+            format!("{} nm/V", number::significant(1e9 * value, 4))
+        });
+    }
+    let kind = if in_volts {
+        Kind::Voltage
+    } else {
+        Kind::Length
+    };
+    // Roots halve the errors.
+    let root = |of: &Estimate| Estimate::new(of.value.sqrt(), 0.5 * of.relative_error);
+    let rms = root(&calibration.mean_square);
+    row("rms of the mode", &rms, &|value| kind.format(value));
+    if let Some(floor) = &calibration.floor {
+        row("noise floor", &root(floor), &|value| {
+            format!("{}/√Hz", kind.format(value))
+        });
+    }
+    table
+}
+
+/// How k follows from the mean square.
+fn factors(calibration: &Calibration) -> String {
+    let factor = &calibration.factor;
+    let significant = |value: f64| number::significant(value, 4);
+    let celsius = number::significant(calibration.temperature - 273.15, 3);
+    let parts = if factor.chi == 1.0 {
+        String::new()
+    } else {
+        format!(
+            " (β = {}, χ = {})",
+            significant(factor.beta),
+            significant(factor.chi)
+        )
+    };
+    let mut text = format!(
+        "k = {} kB T/m{parts}, static, at the end of the lever and normal to it; m the mean square by the static \
+         sensitivity; T = {celsius} °C",
+        significant(factor.product)
+    );
+    if let Some(sader) = calibration.sader {
+        if calibration.sensitivity.is_some() && calibration.stiffness == Some(sader.stiffness) {
+            text = format!(
+                "k by Sader's method, because no sensitivity is known; the sensitivity follows from {} kB T = k m{parts}, \
+                 T = {celsius} °C",
+                significant(factor.product)
+            );
+        }
+        if let Some(reynolds) = sader.reynolds {
+            text.push_str(&format!(
+                "; Reynolds number {}",
+                number::significant(reynolds, 3)
+            ));
+        }
+    }
+    text
+}

@@ -471,6 +471,15 @@ impl Case {
         }
     }
 
+    /// Returns the relative standard error of the lever's spring constant; `None` if it is not stated or
+    /// zero.
+    pub fn stiffness_error(&self) -> Option<f64> {
+        match self.stated(Key::LeverKError)? {
+            Value::Number(error, _) => Some(*error).filter(|error| *error > 0.0),
+            _ => None,
+        }
+    }
+
     /// The same case with one value varied (unchanged if it does not have the key). The
     /// documentation of the module lists what stays constant; [`model`](Self::model) checks the
     /// value.

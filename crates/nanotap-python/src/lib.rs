@@ -57,6 +57,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(study::studies, module)?,
         wrap_pyfunction!(study::report_schema, module)?,
         wrap_pyfunction!(study::table, module)?,
+        wrap_pyfunction!(study::calibrate, module)?,
         wrap_pyfunction!(study::lyapunov, module)?,
         wrap_pyfunction!(study::paper, module)?,
         wrap_pyfunction!(study::paper_sections, module)?,

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nanotap::Error;
 use nanotap::case::Case;
 use nanotap::frame::{Cell, Column, Frame};
+use nanotap::study::calibrate::{CalibrateOptions, calibrate_file, calibrate_table};
 use nanotap::study::fit::Table;
 use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
 use nanotap::study::registry::{self, Answer, Document, Study, StudyEntry};
@@ -169,6 +170,43 @@ pub(crate) fn studies() -> Vec<(&'static str, &'static str, &'static str, String
 #[pyfunction]
 pub(crate) fn report_schema(name: &str) -> PyResult<String> {
     Ok((entry(name)?.report)().as_value().to_string())
+}
+
+/// Calibrates a lever from a file or from the JSON of a table: the document, and the JSON of its table,
+/// its CSV file and its figure.
+#[pyfunction]
+pub(crate) fn calibrate(
+    py: Python<'_>,
+    path: Option<PathBuf>,
+    table: Option<String>,
+    request: &str,
+) -> PyResult<(String, String)> {
+    let options: CalibrateOptions = read(json(request)?).map_err(Failure::from)?;
+    let done = watched(py, None, move |_| {
+        let report = match (path, table) {
+            (Some(path), _) => calibrate_file(&path, &options)?,
+            (None, table) => {
+                let table: Table = serde_json::from_str(&table.unwrap_or_default())?;
+                calibrate_table(&table, &options)?
+            }
+        };
+        let columns: Vec<Value> = (report.columns().into_iter())
+            .map(|column| {
+            json!({
+                "name": column.name,
+                "label": column.label,
+                "unit": column.unit,
+                "values": column.values,
+            })
+        }).collect();
+        let shown = json!({
+            "tables": { "spectrum": columns },
+            "csv": report.csv(),
+            "figure": report.figure().to_json()?,
+        });
+        Ok((serde_json::to_string(&report)?, shown.to_string()))
+    })?;
+    Ok(done.result)
 }
 
 /// A table of measured values from a CSV file, as JSON, with the line of each row.

@@ -239,6 +239,14 @@ const FLANK: Range = Range {
     ..Range::ANY
 };
 
+const RELATIVE_ERROR: Range = Range {
+    low: 0.0,
+    high: 1.0,
+    above: false,
+    below: true,
+    reason: "a relative standard error lies from 0 to below 1",
+};
+
 /// The words of a list of variants, in order.
 macro_rules! words {
     ($kind:ty) => {{
@@ -403,6 +411,8 @@ Before from Parameter::COUNT => {
     LeverThickness = quantity(Cantilever, "thickness", Kind::Length, R::POSITIVE, "thickness in the direction of bending");
     LeverModulus = quantity(Cantilever, "modulus", Kind::Pressure, R::POSITIVE, "Young's modulus along the beam");
     LeverDensity = quantity(Cantilever, "density", Kind::Density, R::POSITIVE, "density of the beam");
+    LeverKError = quantity(Cantilever, "k_error", Kind::Number, RELATIVE_ERROR, "relative standard error of k, as in \"4 %\": fits carry it into standard errors and intervals")
+        .such_as(0.04);
 
     TipMass = quantity(Tip, "mass", Kind::Mass, R::NOT_NEGATIVE, "mass of the tip").feeds(Parameter::Alpha1);
     TipMassRatio = quantity(Tip, "mass_ratio", Kind::Number, R::NOT_NEGATIVE, "mass of the tip over that of the beam")
@@ -586,6 +596,7 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
                 Key::LeverThickness,
                 Key::LeverModulus,
                 Key::LeverDensity,
+                Key::LeverKError,
                 Key::TipMass,
                 Key::TipMassRatio,
                 Key::TipShape,

@@ -6,6 +6,7 @@
 )]
 
 mod branches;
+mod calibrate;
 mod case;
 mod existing_motions;
 mod experiments;

@@ -179,6 +179,9 @@ pub struct FittedParameter {
     pub value: f64,
     /// Standard error of the best value, in `unit`; missing if the data do not determine it.
     pub standard_error: Option<f64>,
+    /// Part of the standard error that `cantilever.k_error` causes, in `unit`; without it, none is stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness_error: Option<f64>,
     /// Ends of the 95 % interval, in `unit`; an end is missing if it is not within the bounds.
     pub interval: [Option<f64>; 2],
     /// Unit of the values in SI, `1` if there is none.

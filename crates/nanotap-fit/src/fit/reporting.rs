@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use nanotap_case::Case;
+use nanotap_case::{Case, Key};
 use nanotap_quantity::number::shortest;
 
 use super::MAX_PERIOD;
 use super::branches::settle;
 use super::data::{Column, Data, Row};
 use super::jumps::Jump;
-use super::parameters::{self, Parameter};
+use super::parameters::{self, Parameter, Target};
 use super::problem::{Problem, RowPoint};
 use super::profile::{Profile, profile};
 use super::report::{
@@ -19,6 +19,7 @@ use super::report::{
     Reading, Undetermined,
 };
 use super::search::{Found, MIN_PROBABILITY, Search, branches_of};
+use super::solve::LeastSquares as _;
 use super::statistics::{self, Information, Sequences, information, student};
 
 /// Smallest reduction of chi2 near the best values that counts.
@@ -35,6 +36,8 @@ const LARGER: f64 = 0.05;
 const MIN_SEQUENCE: usize = 8;
 /// Residuals below this part of a column's spread are rounding.
 const MIN_RESIDUAL: f64 = 1e-5;
+/// Half-width of a 95 % interval of a normal variable, in standard errors.
+const STANDARD_ERRORS_95: f64 = 1.959_963_984_540_054;
 /// Largest number of rows that a remark lists.
 const MAX_LISTED_ROWS: usize = 8;
 
@@ -88,7 +91,8 @@ impl Search<'_> {
         let x = &found.solution.x;
         let information = self.information(found);
         let given = self.all_given();
-        let fitted = Self::fitted(&problem, found, &information, intervals);
+        let shifts = self.by_stiffness(&problem, found, &information);
+        let fitted = Self::fitted(&problem, found, &information, intervals, shifts.as_deref());
         let p_value = given.then(|| self.probability(found));
         let columns = self.columns(found);
         let misfit = self.not_noise(found);
@@ -412,22 +416,83 @@ impl Search<'_> {
         found: &Found,
         information: &Information,
         intervals: Vec<[Option<f64>; 2]>,
+        shifts: Option<&[f64]>,
     ) -> Vec<FittedParameter> {
         let data = problem.data;
         let x = &found.solution.x;
         let all = problem.parameters.iter().zip(x).zip(intervals);
         all.zip(&information.errors)
-            .map(|(((parameter, value), interval), error)| FittedParameter {
-                key: parameter.name.clone(),
-                curve: parameter.curve.map(|curve| data.curves[curve].name.clone()),
-                value: *value,
-                standard_error: *error,
-                interval,
-                unit: parameter.unit(data, problem.case).to_owned(),
-                start: parameter.start,
-                at_bound: *value <= parameter.bounds.0 || *value >= parameter.bounds.1,
+            .enumerate()
+            .map(|(k, (((parameter, value), interval), error))| {
+                let shift = shifts.map_or(0.0, |shifts| shifts[k].abs());
+                // Independent errors add in squares; so do the half-widths of their intervals.
+                let wider = |end: f64| {
+                    let half = nanotap_arithmetic::hypot(end - value, STANDARD_ERRORS_95 * shift);
+                    value + half.copysign(end - value)
+                };
+                FittedParameter {
+                    key: parameter.name.clone(),
+                    curve: parameter.curve.map(|curve| data.curves[curve].name.clone()),
+                    value: *value,
+                    standard_error: error.map(|error| nanotap_arithmetic::hypot(error, shift)),
+                    stiffness_error: shifts.map(|_| shift),
+                    interval: if shift > 0.0 {
+                        interval.map(|end| end.map(wider))
+                    } else {
+                        interval
+                    },
+                    unit: parameter.unit(data, problem.case).to_owned(),
+                    start: parameter.start,
+                    at_bound: *value <= parameter.bounds.0 || *value >= parameter.bounds.1,
+                }
             })
             .collect()
+    }
+
+    /// Changes of the best values for one standard error of the spring constant, to first order:
+    /// −(JᵀJ)⁻¹Jᵀ ∂r/∂k δk. `None` if no error is stated, or the spring constant is fitted.
+    fn by_stiffness(
+        &self,
+        problem: &Problem<'_>,
+        found: &Found,
+        information: &Information,
+    ) -> Option<Vec<f64>> {
+        let case = problem.case;
+        let error = case.stiffness_error()?;
+        let keys = [Key::LeverK1, Key::LeverK];
+        let is_fitted = |p: &Parameter| keys.iter().any(|key| p.target == Target::Key(*key));
+        if problem.parameters.iter().any(is_fitted) || self.control.is_cancelled() {
+            return None;
+        }
+        let is_k1 = case.stated(Key::LeverK1).is_some();
+        let key = if is_k1 { Key::LeverK1 } else { Key::LeverK };
+        let stiffness = case.get(key);
+        let mut parameters = problem.parameters.to_vec();
+        parameters.push(Parameter {
+            name: key.path().to_owned(),
+            target: Target::Key(key),
+            curve: None,
+            start: stiffness,
+            bounds: (0.0, f64::INFINITY),
+            size: stiffness,
+            is_given: true,
+            is_limited: false,
+        });
+        let problem = Problem {
+            parameters: &parameters,
+            ..problem.clone()
+        };
+        let mut x = found.solution.x.clone();
+        let count = x.len();
+        x.push(stiffness);
+        let jacobian = problem.jacobian(&x, &mut found.solution.point.clone())?;
+        let by_stiffness = jacobian.column(count) * (error * stiffness);
+        let gradient = jacobian.columns(0, count).tr_mul(&by_stiffness);
+        let shifts = -(&information.covariance * gradient);
+        shifts
+            .iter()
+            .all(|of| of.is_finite())
+            .then(|| shifts.iter().copied().collect())
     }
 
     /// Lists the rows without an orbit, and the motion of the lever there.

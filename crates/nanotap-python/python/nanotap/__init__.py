@@ -2,7 +2,7 @@
 
 A `Case` describes cantilever, sample and drive. There is a function for every command of the
 terminal: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`, `branch`, `approach`,
-`fm`, `force_curve`, `lever`, `scan`, `fit`, `fit_map`, `reconstruct`, `window`, `lyapunov`, `convergence`,
+`fm`, `force_curve`, `lever`, `scan`, `calibrate`, `fit`, `fit_map`, `reconstruct`, `window`, `lyapunov`, `convergence`,
 `contact_laws`, `paper`, `merge`. Results are xarray Datasets, objects and lists of objects, with the names of the terminal's
 JSON. A `Map` is the exact stroboscopic map, for your own algorithms.
 
@@ -38,7 +38,7 @@ from ._results import (
 )
 from ._si import in_si
 from ._signatures import *
-from ._studies import fit_map, paper
+from ._studies import calibrate, fit_map, paper
 
 # Not in `__all__`: `import *` would hide the builtin.
 range = Range
@@ -66,6 +66,7 @@ __all__ = [
     "Report",
     "StudyDataset",
     "__version__",
+    "calibrate",
     "catalogue",
     "export",
     "fit_map",

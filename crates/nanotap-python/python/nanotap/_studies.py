@@ -1,6 +1,7 @@
 """Studies: census, branches, exponents, number of modes, fits, the paper."""
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -8,12 +9,12 @@ import numpy as np
 
 from . import _arguments, _datasets, _nanotap
 from ._arguments import Progress
-from ._case import Case, Path
+from ._case import Case, Path, existing
 from ._describe import case_attributes, declared, describe
 from ._interrupt import Interrupted, part_of, stoppable
 from ._motions import _cased, words
 from ._progress import bar
-from ._quantity import si_unit
+from ._quantity import si_unit, written
 from ._record import Record, plain
 from ._report import Answer, Report
 from ._results import (
@@ -535,6 +536,53 @@ def fit_map(
     plan = ("fit", _cased(case), _arguments.request("fit", asked))
     ds = _datasets.computed(plan, "rows", out, chunk, threads, client, progress)
     return ds.assign(result=_datasets.in_words(ds.result))
+
+
+@stoppable()
+def calibrate(data: Any, **options: Any) -> Report:
+    """Calibrates a lever from its thermal noise: spring constant, quality factor, resonance frequency,
+    sensitivity.
+
+    Args:
+        data: A spectrum or a record of the deflection: the path of an instrument's file or of a table, or
+            a table: a mapping or data frame with columns such as "frequency (kHz)" and
+            "PSD (pm^2/Hz)", or "time (s)" and "deflection (V)".
+        **options: Options of `nanotap calibrate`, with underscores: `temperature` (°C),
+            `sensitivity="40 nm/V"`, `averages`, `average`, `from_="8 kHz"`, `to`, `factor`, `tilt`,
+            `length`, `width`, `fluid` …; `nanotap calibrate --help` describes all of them.
+
+    Returns:
+        The document. `stiffness`, `quality`, `frequency`, `sader.stiffness` and `sensitivity` have
+        `value`, `relative_error` and the 95 % `interval`, in SI; `cantilever` is a block for a case
+        file; `warnings` lists what puts the numbers in doubt. `.to_dataframe()` is the spectrum with
+        the fit, `.plot()` its figure.
+
+    Raises:
+        ValueError: an option or the data are not valid, or there is no resonance.
+
+    Example:
+        >>> import numpy as np, nanotap
+        >>> f, (f0, Q) = np.arange(20e3, 150e3, 100), (75e3, 50)
+        >>> psd = 1e-27 + 1e-25 / ((1 - (f / f0) ** 2) ** 2 + (f / f0 / Q) ** 2)
+        >>> found = nanotap.calibrate({"f (Hz)": f, "PSD (m^2/Hz)": psd}, averages=100)
+        >>> print(f"{found.quality.value:.2f}, {found.frequency.value:.0f} Hz")
+        50.00, 75000 Hz
+    """
+    request = {
+        "from" if name == "from_" else name: written(value)
+        for name, value in options.items()
+        if value is not None
+    }
+    if isinstance(data, str | os.PathLike):
+        path, table = existing(data), None
+    else:
+        found = _arguments.tables(data)
+        if len(found) != 1:
+            message = f"data: expected one table, got {len(found)}"
+            raise ValueError(message)
+        path, table = None, json.dumps(found[0])
+    document, shown = _nanotap.calibrate(path, table, json.dumps(request))
+    return Report(json.loads(document), Answer(None, **json.loads(shown)))
 
 
 @stoppable()

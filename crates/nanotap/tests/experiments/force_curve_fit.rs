@@ -129,6 +129,45 @@ const EXAMPLES: [Example; 3] = [
     },
 ];
 
+/// The error of k against fits with k one standard error lower and higher: to first order the modulus
+/// changes by the same amount both ways.
+#[test]
+fn the_error_of_k_is_in_standard_errors_and_intervals() {
+    let curve = curve(&case("hertz", HERTZ));
+    let free = ["sample.modulus", "gap.offset", "deflection.offset"];
+    let modulus = |words: &[&str]| {
+        let case = case("hertz", &[HERTZ, words].concat());
+        fitted(&case, recorded(&curve, NOISE, 1), &free)
+            .parameters
+            .remove(0)
+    };
+    let plain = modulus(&[]);
+    assert_eq!(plain.stiffness_error, None);
+    let found = modulus(&["cantilever.k_error=4 %"]);
+    assert_eq!(found.value, plain.value);
+    let [low, high] =
+        ["cantilever.k=0.48 N/m", "cantilever.k=0.52 N/m"].map(|k| modulus(&[k]).value);
+    let shift = 0.5 * (high - low);
+    // The force is proportional to k, and so nearly is the modulus.
+    assert!(
+        (shift / (0.04 * plain.value) - 1.0).abs() < 0.2,
+        "{shift} {}",
+        plain.value
+    );
+    let error = found.stiffness_error.unwrap();
+    assert!((error / shift - 1.0).abs() < 0.02, "{error} {shift}");
+    let whole = plain.standard_error.unwrap().hypot(error);
+    assert!((found.standard_error.unwrap() / whole - 1.0).abs() < 1e-12);
+    for (wide, narrow) in found.interval.into_iter().zip(plain.interval) {
+        let half = |end: Option<f64>| (end.unwrap() - plain.value).abs();
+        let expected = half(narrow).hypot(1.959_964 * error);
+        assert!(
+            (half(wide) / expected - 1.0).abs() < 1e-6,
+            "{wide:?} {expected}"
+        );
+    }
+}
+
 #[test]
 fn the_figure_shows_the_deflection_in_nanometres() {
     let curve = curve(&case("hertz", HERTZ));

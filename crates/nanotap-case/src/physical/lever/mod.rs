@@ -576,6 +576,8 @@ impl LeverData {
         if let Some(modes) = reader.lever_modes() {
             return Ok(Self::of_modes(modes, reader.number(Key::LeverLength)?));
         }
+        // Only its range matters here: fits read it.
+        reader.number(Key::LeverKError)?;
         let fluid = Fluid::read(reader)?;
         let quality_factor = reader.number(Key::LeverQ)?;
         if quality_factor.is_none() && fluid.is_none() {

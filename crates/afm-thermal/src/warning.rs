@@ -11,7 +11,7 @@ pub enum Warning {
     ForeignPeak {
         /// Frequency of its highest bin, Hz.
         frequency: f64,
-        /// Its height relative to the noise around it.
+        /// Its height relative to the fit.
         height: f64,
     },
     /// More peaks that are not thermal noise than are named.
@@ -94,8 +94,9 @@ impl fmt::Display for Warning {
         match self {
             Self::ForeignPeak { frequency, height } => write!(
                 f,
-                "narrow peak at {} kHz, {height:.3} times the noise around it: not thermal noise; left out",
-                kilo(*frequency)
+                "narrow peak at {} kHz, {} times as high as the fit: not thermal noise; left out",
+                kilo(*frequency),
+                short(*height)
             ),
             Self::MoreForeignPeaks { count } => {
                 write!(f, "{count} more narrow peaks left out")

@@ -291,6 +291,16 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
              them as well.",
         ));
     }
+    let has_error = report
+        .parameters
+        .iter()
+        .any(|p| p.stiffness_error.is_some());
+    if let Some(error) = case.stiffness_error().filter(|_| has_error) {
+        text.push_str(&motion::paragraph(&format!(
+            "Standard errors and intervals contain the error of k, {} %.",
+            number::significant(100.0 * error, 2)
+        )));
+    }
     let chance = report.p_value.map_or_else(String::new, |p| {
         format!(
             ", exceeded by chance with probability {}",

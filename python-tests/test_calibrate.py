@@ -23,7 +23,10 @@ def density(frequency):
 @pytest.fixture
 def columns():
     frequency = np.arange(10e3, 200e3, 100)
-    return {"frequency (kHz)": frequency / 1e3, "PSD (pm^2/Hz)": 1e24 * density(frequency)}
+    return {
+        "frequency (kHz)": frequency / 1e3,
+        "PSD (pm^2/Hz)": 1e24 * density(frequency),
+    }
 
 
 def test_a_table_has_the_stiffness_of_equipartition(columns):
@@ -48,7 +51,12 @@ def test_the_spectrum_is_a_table_and_a_figure(columns):
 
 
 def test_a_file_and_its_table_are_the_same():
-    options = {"averages": 50, "sensitivity": "62 nm/V", "from_": "60 kHz", "to": "90 kHz"}
+    options = {
+        "averages": 50,
+        "sensitivity": "62 nm/V",
+        "from_": "60 kHz",
+        "to": "90 kHz",
+    }
     file = CASES / "thermal-spectrum.csv"
     of_file = nanotap.calibrate(file, **options)
     of_table = nanotap.calibrate(nanotap.read(file), **options)

@@ -192,13 +192,14 @@ pub(crate) fn calibrate(
         };
         let columns: Vec<Value> = (report.columns().into_iter())
             .map(|column| {
-            json!({
-                "name": column.name,
-                "label": column.label,
-                "unit": column.unit,
-                "values": column.values,
+                json!({
+                    "name": column.name,
+                    "label": column.label,
+                    "unit": column.unit,
+                    "values": column.values,
+                })
             })
-        }).collect();
+            .collect();
         let shown = json!({
             "tables": { "spectrum": columns },
             "csv": report.csv(),

@@ -12,7 +12,7 @@ use crate::arguments::{OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::text_table::{Align, Table};
 use crate::{motion, number, style};
 
 /// Calibrate a lever from its thermal noise: k, Q, f0, sensitivity.

@@ -124,6 +124,15 @@ impl Data {
         self.curves.iter().flat_map(|curve| &curve.rows)
     }
 
+    /// Keeps the rows for which `keeps` is true, given the name of their curve, and the curves that have
+    /// such rows.
+    pub(super) fn retain(&mut self, keeps: impl Fn(&str, &Row) -> bool) {
+        for curve in &mut self.curves {
+            curve.rows.retain(|row| keeps(&curve.name, row));
+        }
+        self.curves.retain(|curve| !curve.rows.is_empty());
+    }
+
     /// Reads the data in `tables`; `only` names the columns to use, all if it is empty.
     ///
     /// # Errors

@@ -80,6 +80,48 @@ pub(crate) struct Prepared {
     pub(crate) notes: Vec<String>,
     /// Whether the zero of a phase was guessed.
     pub(crate) guessed_phase: bool,
+    /// What the distance and the deflection of each table are in its file.
+    pub(crate) channels: Vec<Channels>,
+}
+
+/// What the columns of a force curve are in its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Channels {
+    /// Name of the table.
+    pub(crate) table: String,
+    /// Name of the distance.
+    pub(crate) distance: String,
+    /// Whether the distance grows towards the sample in the file.
+    pub(crate) is_reversed: bool,
+    /// Name of the deflection or the force.
+    pub(crate) deflection: String,
+    /// Stiffness of the lever in the header, N/m.
+    pub(crate) spring_constant: Option<f64>,
+    /// Sensitivity in the header, m/V.
+    pub(crate) sensitivity: Option<f64>,
+    /// How many rows are fitted, before they are averaged.
+    pub(crate) rows: usize,
+}
+
+impl Channels {
+    /// The channels of a prepared table; `renamed` columns have their names of the file.
+    fn of(table: &Table, renamed: &[(String, String)], is_reversed: bool) -> Self {
+        let name = |names: &[&str]| {
+            let place = place_of(table, names)?;
+            let present = Header::of(&table.columns[place].0).name;
+            let own = renamed.iter().find(|(known, _)| *known == present);
+            Some(own.map_or(present, |(_, own)| own.clone()))
+        };
+        Self {
+            table: table.name.clone(),
+            distance: name(&["distance", "zc", "gap", "gap.tip"]).unwrap_or_default(),
+            is_reversed,
+            deflection: name(&["deflection", "force"]).unwrap_or_default(),
+            spring_constant: noted(table, SPRING_CONSTANT),
+            sensitivity: noted(table, SENSITIVITIES[0].1),
+            rows: table.rows(),
+        }
+    }
 }
 
 /// Properties of a table that the request states, so that they are not guessed.
@@ -139,6 +181,7 @@ pub(crate) fn prepared(
         notes.push(format!("converted as stated: {text}"));
     }
     let mut guessed_phase = false;
+    let mut channels = Vec::new();
     for (table, stated) in tables.iter_mut().zip(stated) {
         let comma = table.notes.iter().find(|(name, _)| name == DECIMAL_COMMAS);
         notes.extend(comma.map(|(_, note)| format!("{}: {note}", table.name)));
@@ -156,7 +199,8 @@ pub(crate) fn prepared(
             leave_out(case, table, &columns, &mut notes);
         }
         guessed_phase |= guess(case, table, &renamed, foreign, stated, &mut notes)?;
-        guess_force_curve(case, table, stated, &mut notes);
+        let is_reversed = guess_force_curve(case, table, stated, &mut notes);
+        channels.push(Channels::of(table, &renamed, is_reversed));
         for (place, (written, _)) in table.columns.iter().enumerate() {
             if is_chosen(written, &columns) && data::is_length(&Header::of(written), case) {
                 check_volts(table, place, &renamed)?;
@@ -168,6 +212,7 @@ pub(crate) fn prepared(
         columns,
         notes,
         guessed_phase,
+        channels,
     })
 }
 
@@ -485,20 +530,26 @@ const SENSITIVITIES: [(&str, &str); 2] = [("deflection", "InvOLS"), ("amplitude"
 /// reported.
 const OTHER_LEVER: f64 = 0.02;
 
+/// Stiffness, resonance and quality factor of the lever in the header, in N/m, Hz and 1.
+pub(super) const SPRING_CONSTANT: &str = "SpringConstant";
+pub(super) const THERMAL_FREQUENCY: &str = "ThermalFrequency";
+pub(super) const THERMAL_QUALITY: &str = "ThermalQ";
+
+/// A positive number in the header of a table's file.
+pub(super) fn noted(table: &Table, name: &str) -> Option<f64> {
+    let (_, value) = table.notes.iter().find(|(known, _)| known == name)?;
+    let value = value.parse::<f64>().ok();
+    value.filter(|of| of.is_finite() && *of > 0.0)
+}
+
 /// What the header of an instrument's file says: the sensitivity of columns in V, and the lever,
 /// where it is another than that of the case.
 fn from_header(case: &Case, table: &mut Table, notes: &mut Vec<String>) {
-    let stated = |name: &str| {
-        let (_, value) = table.notes.iter().find(|(known, _)| known == name)?;
-        value
-            .parse::<f64>()
-            .ok()
-            .filter(|of| of.is_finite() && *of > 0.0)
-    };
+    let stated = |name: &str| noted(table, name);
     let levers = [
-        (Key::LeverK, "SpringConstant", "N/m"),
-        (Key::LeverF0, "ThermalFrequency", "Hz"),
-        (Key::LeverQ, "ThermalQ", ""),
+        (Key::LeverK, SPRING_CONSTANT, "N/m"),
+        (Key::LeverF0, THERMAL_FREQUENCY, "Hz"),
+        (Key::LeverQ, THERMAL_QUALITY, ""),
     ];
     for (key, name, unit) in levers {
         let value = case.get(key);
@@ -668,18 +719,29 @@ fn distance_of_separation(
     Ok(())
 }
 
-/// Direction of the distance of a force curve, and where it turns.
-fn guess_force_curve(case: &Case, table: &mut Table, stated: Stated, notes: &mut Vec<String>) {
+/// Whether a table is a force curve, by the names of its columns: the lever does not oscillate.
+pub(super) fn is_plain_force_curve(table: &Table) -> bool {
+    is_force_curve(table) && !oscillates(table)
+}
+
+/// Direction of the distance of a force curve, and where it turns. Returns whether the distance is
+/// counted the other way than in the file.
+fn guess_force_curve(
+    case: &Case,
+    table: &mut Table,
+    stated: Stated,
+    notes: &mut Vec<String>,
+) -> bool {
     let places = (
         place_of(table, &["distance", "zc", "gap"]),
         place_of(table, &["deflection", "force"]),
     );
     let ((Some(place), Some(of)), false) = (places, oscillates(table)) else {
-        return;
+        return false;
     };
     let known = (numbers(table, place), numbers(table, of));
     let (Some(mut distance), Some(values)) = known else {
-        return;
+        return false;
     };
     let places = Places {
         distance: place,
@@ -687,9 +749,10 @@ fn guess_force_curve(case: &Case, table: &mut Table, stated: Stated, notes: &mut
         phase: of,
     };
     if distance.len() < MIN_ROWS || !is_curve(case, table, &places) {
-        return;
+        return false;
     }
-    if !stated.direction && bends_far(&distance, &values) {
+    let is_reversed = !stated.direction && bends_far(&distance, &values);
+    if is_reversed {
         for z in &mut distance {
             *z = -*z;
         }
@@ -700,6 +763,7 @@ fn guess_force_curve(case: &Case, table: &mut Table, stated: Stated, notes: &mut
         ));
     }
     add_direction(table, &distance, notes);
+    is_reversed
 }
 
 /// Whether a force curve changes more where the distance is large than where it is small.

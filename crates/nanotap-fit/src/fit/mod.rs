@@ -25,7 +25,9 @@
 mod baseline;
 mod branches;
 mod data;
+mod force_curve;
 mod guess;
+mod implied_case;
 pub(crate) mod instrument;
 mod jumps;
 mod laws;
@@ -37,6 +39,7 @@ mod quantity;
 mod report;
 mod reporting;
 mod search;
+mod selection;
 mod solve;
 mod statistics;
 pub(crate) mod thin;
@@ -46,21 +49,26 @@ use nanotap_dynamics::Control;
 use crate::figure::fit::fit_figure;
 pub(crate) use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
+pub use implied_case::{ImpliedWords, implied_words};
 pub use map::{FitMap, FitMapReport, MappedParameter};
 pub use nanotap_case::table::{Entry, MAX_ROWS, Table};
 use nanotap_figures::Figure;
 use nanotap_observe::frame::Frame;
 pub use quantity::Quantity;
 pub use report::{
-    ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
-    OtherOrbit, Reading, Undetermined,
+    ComparedLaw, CurveCase, Estimate, FitReport, FittedColumn, FittedForceCurve, FittedJump,
+    FittedParameter, FittedRow, OtherOrbit, Reading, Undetermined,
 };
 
+pub use selection::Segment;
+
 use guess::begin_from_free_rows;
+use instrument::Channels;
 use parameters::{begin, correct, keep_physical, parameters, starts};
 use problem::Problem;
 use problem::held::Loop;
 use search::Search;
+use selection::{Contact, MAX_SELECTIONS, Selection};
 use solve::LeastSquares as _;
 
 use nanotap_case::Case;
@@ -68,7 +76,7 @@ use nanotap_error::Error;
 use nanotap_motions::setpoint::at_setpoint;
 use nanotap_study::Study;
 use nanotap_study::request::options;
-use nanotap_study::value::Intervals;
+use nanotap_study::value::{Amount, Intervals};
 
 /// Largest number of initial values of a fit.
 const MAX_STARTS: usize = 1000;
@@ -84,7 +92,8 @@ options! {
         /// `phase (deg)`
         #[schemars(extend("x-own" = true))]
         pub data: Vec<Table> = Vec::new(),
-        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
+        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column;
+        /// default for a force curve: modulus, contact point, baseline, and the adhesion of the law
         #[schemars(extend("x-value" = "KEY,…"))]
         pub free: Vec<String> = Vec::new(),
         /// Parameters to find with one value per curve
@@ -106,6 +115,25 @@ options! {
         /// Columns that name the pixel of a force volume, as in x,y: one fit a pixel, into a dataset
         #[schemars(extend("x-value" = "NAME,…"))]
         pub pixels: Vec<String> = Vec::new(),
+        /// Segment of a curve to fit; default for a force curve: its approach under an elastic law, both
+        /// under one with adhesion or losses
+        pub segment: Option<Segment> = None,
+        /// Rows to fit: their numbers, or forces from the baseline, or indentations from the contact
+        /// point, as in rows=100:2000, force="0.1 nN:2 nN" or indentation="-1 um:300 nm"
+        #[schemars(extend("x-value" = "NAME=LOW:HIGH"))]
+        pub range: Intervals = Intervals::default(),
+        /// Radius of the tip, as in "40 nm", in place of the case's
+        #[schemars(extend("x-value" = "LENGTH"))]
+        pub tip_radius: Option<Amount> = None,
+        /// Half angle of a conical tip, as in "20 deg", in place of the case's
+        #[schemars(extend("x-value" = "ANGLE"))]
+        pub half_angle: Option<Amount> = None,
+        /// Stiffness of the lever, as in "0.05 N/m", in place of the case's and of the file's header
+        #[schemars(extend("x-value" = "STIFFNESS"))]
+        pub spring_constant: Option<Amount> = None,
+        /// Poisson's ratio of the sample, in place of the case's; without a case 0.5
+        #[schemars(extend("x-value" = "RATIO"))]
+        pub poisson: Option<Amount> = None,
         /// Contact laws to compare, as in hertz,dmt; default: the law of the case
         #[schemars(extend("x-value" = "LAW,…"))]
         pub laws: Vec<String> = Vec::new(),
@@ -192,24 +220,57 @@ impl Study for FitStudy {
 /// # Errors
 /// If the data or the parameters are invalid, or no orbit is found for the data.
 pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
+    let case = &implied_case::with_options(case, request)?;
     if names(&request.laws).is_empty() {
-        fit_one(case, request, control)
-    } else {
-        laws::compare(case, request, control)
+        return fit_one(case, request, control);
     }
+    // All laws describe the same rows.
+    let same_rows = FitOptions {
+        segment: segment_of_laws(case, request),
+        ..request.clone()
+    };
+    laws::compare(case, &same_rows, control)
+}
+
+/// The segment that all laws of a request describe; that of the request, if the data are not force
+/// curves.
+fn segment_of_laws(case: &Case, request: &FitOptions) -> Option<Segment> {
+    let of_force_curves = request.data.iter().all(instrument::is_plain_force_curve);
+    let default = || of_force_curves.then(|| selection::default_segment(case, request));
+    request.segment.or_else(default)
 }
 
 /// Finds the free parameters under the law of the case. Rows in whose order the tip may have moved
 /// either way, and that the model does not describe, are tried in the other order.
 fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
-    let run = |request: &FitOptions| {
-        with_search(case, request, control, |search| {
-            let knows_way = search.problem.data.rows().any(|row| row.way.is_some());
-            let swept = search.problem.data.swept.first();
-            let by_distance = swept.is_some_and(|swept| data::is_distance(swept.key));
-            let is_rest = search.problem.data.is_force_curve();
-            Ok((search.run()?, knows_way || !by_distance || is_rest))
-        })
+    let run = |request: &FitOptions| -> Result<(FitReport, bool), Error> {
+        let mut selection = Selection::of(case, request)?;
+        let mut rounds = MAX_SELECTIONS;
+        loop {
+            let found = with_search(case, request, &selection, control, |search, channels| {
+                let knows_way = search.problem.data.rows().any(|row| row.way.is_some());
+                let swept = search.problem.data.swept.first();
+                let by_distance = swept.is_some_and(|swept| data::is_distance(swept.key));
+                let is_rest = search.problem.data.is_force_curve();
+                let mut report = search.run()?;
+                let contacts = Contact::of(search, &report);
+                report.force_curves = force_curve::summaries(search, &report, &contacts, channels);
+                Ok((report, knows_way || !by_distance || is_rest, contacts))
+            });
+            let (mut report, is_known, contacts) = found?;
+            let is_other = selection.needs_contact() && selection.refine(contacts);
+            rounds -= 1;
+            if is_other && rounds == 0 {
+                report.remarks.push(
+                    "the range of forces or indentations selects other rows after every fit: select \
+                     rows by their numbers"
+                        .to_owned(),
+                );
+            }
+            if !is_other || rounds == 0 || control.is_cancelled() {
+                return Ok((report, is_known));
+            }
+        }
     };
     let (found, is_known) = run(request)?;
     let [table] = &request.data[..] else {
@@ -241,8 +302,9 @@ fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
 fn with_search<R>(
     case: &Case,
     request: &FitOptions,
+    selection: &Selection,
     control: &Control<'_>,
-    work: impl FnOnce(&Search<'_>) -> Result<R, Error>,
+    work: impl FnOnce(&Search<'_>, &[Channels]) -> Result<R, Error>,
 ) -> Result<R, Error> {
     if request.data.is_empty() {
         return Err(Error::option("data", "no data were given", "give a table"));
@@ -257,7 +319,9 @@ fn with_search<R>(
     let columns = names(&request.columns);
     let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
     let mut preparation = measured.notes;
+    let mut channels = measured.channels;
     let mut data = Data::read(case, &measured.tables, &measured.columns)?;
+    drop(measured.tables);
     let sets_distance = data.swept.iter().any(|s| data::is_distance(s.key));
     // The distance of the case is irrelevant if the rows set it.
     let case = if sets_distance {
@@ -289,6 +353,22 @@ fn with_search<R>(
         free.iter().chain(&per_curve).any(|free| free == name)
     })?;
     preparation.extend(corrected);
+    preparation.extend(selection.apply(&mut data)?);
+    for channels in &mut channels {
+        let own = data
+            .curves
+            .iter()
+            .find(|curve| curve.name == channels.table);
+        channels.rows = own.map_or(channels.rows, |curve| curve.rows.len());
+    }
+    if data.is_force_curve() && free.is_empty() && per_curve.is_empty() {
+        preparation.push(force_curve::free_by_default(
+            &case,
+            &data,
+            &mut free,
+            &mut per_curve,
+        ));
+    }
     data.add_free_scatter();
     preparation.extend(data.average(request.rows));
     if data.is_force_curve() {
@@ -302,7 +382,7 @@ fn with_search<R>(
         .is_modulated()
         .then(|| Loop::of(&case, request.phase))
         .transpose()?;
-    work(&Search {
+    let search = Search {
         preparation: &preparation,
         problem: Problem {
             case: &case,
@@ -316,7 +396,8 @@ fn with_search<R>(
         },
         request,
         control,
-    })
+    };
+    work(&search, &channels)
 }
 
 /// The measured curves of a fit as the model reads them: converted, not averaged.
@@ -349,7 +430,9 @@ pub fn residuals(
     values: &[f64],
     control: &Control<'_>,
 ) -> Result<Residuals, Error> {
-    with_search(case, request, control, |search| {
+    let case = &implied_case::with_options(case, request)?;
+    let selection = Selection::of(case, request)?;
+    with_search(case, request, &selection, control, |search, _| {
         let count = search.problem.parameters.len();
         if values.len() != count {
             return Err(Error::input(

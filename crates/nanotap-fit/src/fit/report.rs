@@ -66,6 +66,9 @@ pub struct FitReport {
     pub swept: String,
     /// Its unit in SI, `1` if there is none.
     pub swept_unit: String,
+    /// What the fit of each force curve says of sample and contact.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub force_curves: Vec<FittedForceCurve>,
     /// The rows, curve by curve.
     pub rows: Vec<FittedRow>,
     /// Jumps of the data from one branch to another at a fold.
@@ -125,6 +128,80 @@ impl FitReport {
             .aligned(Right, Right);
         }
     }
+}
+
+/// A value of a fit with its errors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Its standard error; missing if the data do not determine it.
+    pub standard_error: Option<f64>,
+    /// Ends of its 95 % interval; an end is missing if it is not within the bounds.
+    pub interval: [Option<f64>; 2],
+}
+
+impl Estimate {
+    /// The estimate of the negative quantity.
+    pub(super) fn negated(self) -> Self {
+        let [low, high] = self.interval;
+        Self {
+            value: -self.value,
+            interval: [high.map(|end| -end), low.map(|end| -end)],
+            ..self
+        }
+    }
+}
+
+/// What the fit of a force curve says of sample and contact. Values that are not free are missing among
+/// the estimates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FittedForceCurve {
+    /// Name of the curve.
+    pub curve: String,
+    /// Young's modulus of the sample, Pa.
+    pub modulus: Option<Estimate>,
+    /// Contact point, m: the distance, as the file counts it, at which the undeflected tip meets the
+    /// undeformed surface.
+    pub contact_point: Option<Estimate>,
+    /// Deflection or force far from the sample, in `baseline_unit`.
+    pub baseline: Option<Estimate>,
+    /// Unit of the baseline.
+    pub baseline_unit: String,
+    /// Lowest force of the model on the way back, N, under a law that attracts.
+    pub adhesion_force: Option<f64>,
+    /// Contact law; missing for the linear default.
+    pub law: Option<String>,
+    /// Radius of the tip, m, if the law has one.
+    pub tip_radius: Option<f64>,
+    /// Half angle of the tip, rad, if the law has one.
+    pub half_angle: Option<f64>,
+    /// Poisson's ratio of the sample.
+    pub poisson: Option<f64>,
+    /// Segment whose rows were fitted; missing if the rows do not say.
+    pub segment: Option<String>,
+    /// Number of rows that were fitted, before they were averaged.
+    pub rows: usize,
+    /// Name of the distance in the file.
+    pub distance: String,
+    /// Name of the deflection or the force in the file.
+    pub deflection: String,
+    /// Stiffness of the lever, N/m.
+    pub spring_constant: f64,
+    /// Where that comes from: `header` of the file, or `case`.
+    pub spring_constant_from: String,
+    /// Stiffness of the lever in the header of the file, N/m.
+    pub spring_constant_in_header: Option<f64>,
+    /// Sensitivity in the header of the file, m/V.
+    pub sensitivity_in_header: Option<f64>,
+    /// Largest force, N.
+    pub largest_force: f64,
+    /// Largest indentation, m.
+    pub largest_indentation: f64,
+    /// Root mean square of the residuals as a force, N.
+    pub residual_force: f64,
+    /// Sentences on what to be careful of.
+    pub cautions: Vec<String>,
 }
 
 /// A contact law among others that were fitted to the same data.

@@ -137,6 +137,7 @@ impl Search<'_> {
                 .map(|i| information.correlations.row(i).iter().copied().collect())
                 .collect(),
             columns,
+            force_curves: Vec::new(),
             swept: swept.path().to_owned(),
             swept_unit: parameters::unit_of(swept).to_owned(),
             rows: rows(&problem, found),

@@ -85,16 +85,16 @@ impl Problem<'_> {
         rows.map(|row| self.place(x, curve, row)[0]).collect()
     }
 
-    /// The case of a curve at its first row.
-    fn case_of_rests(&self, x: &[f64], curve: usize, base: &Case) -> Option<Case> {
-        let first = self.data.curves[curve].rows.first()?;
-        Some(self.case_at(base, &self.place(x, curve, first)))
+    /// The case of a curve at the surface: rests are found at any distance from there, even at one
+    /// that no case can have, as the absolute height of an instrument.
+    fn case_of_rests(&self, base: &Case) -> Case {
+        base.with(self.data.swept[0].key, 0.0)
     }
 
     /// The lever of a curve.
     pub(in crate::fit) fn rested(&self, x: &[f64], curve: usize) -> Option<Rested> {
         self.finished(())?;
-        let case = self.case_of_rests(x, curve, &self.cases(x)[curve])?;
+        let case = self.case_of_rests(&self.cases(x)[curve]);
         Some(Rested {
             lever: RestLever::of(&case).ok()?,
             rows: span(self.distances(x, curve).into_iter()),
@@ -281,7 +281,7 @@ impl Nearby {
         let bases = problem.cases(x);
         let curves: Vec<usize> = (0..bases.len()).collect();
         let of = |curve: &usize| {
-            let case = problem.case_of_rests(x, *curve, &bases[*curve])?;
+            let case = problem.case_of_rests(&bases[*curve]);
             let mut keys: Vec<Key> = effects[*curve].iter().flatten().map(|(k, _)| *k).collect();
             keys.sort_unstable();
             keys.dedup();

@@ -1,0 +1,243 @@
+//! Force curves: what is free unless it is stated, and what a fit says of each curve in the words of
+//! the measurement.
+
+use super::data::Data;
+use super::instrument::Channels;
+use super::parameters::Target;
+use super::quantity::RestQuantity;
+use super::report::{Estimate, FitReport, FittedForceCurve};
+use super::search::Search;
+use super::selection::Contact;
+use nanotap_case::physical::Kind;
+use nanotap_case::under_law::LawName;
+use nanotap_case::{Case, Key};
+
+use nanotap_motions::approach::Way;
+
+/// Keys of the adhesion, of which the first that the case states is free.
+const ADHESION: [Key; 3] = [
+    Key::SampleWorkOfAdhesion,
+    Key::SampleAdhesionForce,
+    Key::SampleHamaker,
+];
+/// A stiffness of the header that differs from the case's by more than this part is another one.
+const SAME_STIFFNESS: f64 = 1e-6;
+/// Indentations beyond this part of the tip's radius leave the range of a parabola: the contact radius
+/// is then the tip's.
+const DEEP: f64 = 1.0;
+/// A force below the baseline of more than this part of the largest is an adhesion that the law lacks.
+const ADHERES: f64 = 0.05;
+/// Fewest rows in contact, and before it, that determine a modulus and a baseline.
+const MIN_ROWS: usize = 5;
+
+/// Frees what a force curve determines: the modulus, the contact point, the baseline and the adhesion;
+/// the contact point and the baseline of each curve if there are several. Says so.
+pub(super) fn free_by_default(
+    case: &Case,
+    data: &Data,
+    free: &mut Vec<String>,
+    per_curve: &mut Vec<String>,
+) -> String {
+    let is_stated = |key: &Key| case.stated(*key).is_some();
+    let stiffness = [Key::SampleModulus, Key::SampleStiffness];
+    let mut keys: Vec<Key> = stiffness.into_iter().filter(is_stated).take(1).collect();
+    if keys.is_empty() {
+        // A material states the modulus.
+        let known = stiffness
+            .into_iter()
+            .filter(|key| case.get(*key).is_finite());
+        keys.extend(known.take(1));
+    }
+    keys.extend(ADHESION.into_iter().filter(is_stated).take(1));
+    free.extend(keys.iter().map(|key| key.path().to_owned()));
+    let column = data
+        .columns
+        .first()
+        .map_or("deflection", |c| c.quantity.name());
+    let offsets = ["gap.offset".to_owned(), format!("{column}.offset")];
+    if data.curves.len() > 1 {
+        per_curve.extend(offsets);
+    } else {
+        free.extend(offsets);
+    }
+    let all: Vec<&str> = free.iter().chain(&*per_curve).map(String::as_str).collect();
+    format!(
+        "free, because the option `free` names nothing: {}",
+        all.join(", ")
+    )
+}
+
+/// What the fit of each force curve says; nothing for other data.
+pub(super) fn summaries(
+    search: &Search<'_>,
+    report: &FitReport,
+    contacts: &[Contact],
+    channels: &[Channels],
+) -> Vec<FittedForceCurve> {
+    let curves = search.problem.data.curves.iter().enumerate();
+    curves
+        .zip(contacts)
+        .map(|((curve, of), contact)| {
+            let named = |channels: &&Channels| channels.table == of.name;
+            let channels = channels.iter().find(named).or_else(|| channels.first());
+            summary(search, report, (curve, contact), channels)
+        })
+        .collect()
+}
+
+fn summary(
+    search: &Search<'_>,
+    report: &FitReport,
+    (curve, contact): (usize, &Contact),
+    channels: Option<&Channels>,
+) -> FittedForceCurve {
+    let problem = &search.problem;
+    let data = problem.data;
+    let of = &data.curves[curve];
+    let x: Vec<f64> = report.parameters.iter().map(|p| p.value).collect();
+    let case = problem.cases(&x).swap_remove(curve);
+    let channels = channels.cloned().unwrap_or_default();
+    let estimate = |is: &dyn Fn(Target) -> bool| {
+        let mut both = problem.parameters.iter().zip(&report.parameters);
+        let (_, found) = both.find(|(p, _)| is(p.target) && p.is_of(curve))?;
+        Some(Estimate {
+            value: found.value,
+            standard_error: found.standard_error,
+            interval: found.interval,
+        })
+    };
+    let of_key = |key: Key| estimate(&|target| target == Target::Key(key));
+    let contact_point = estimate(&|target| target == Target::Place(0)).map(|found| {
+        // The gap is distance + offset, and the distance may be counted the other way.
+        if channels.is_reversed {
+            found
+        } else {
+            found.negated()
+        }
+    });
+    let rows: Vec<[f64; 2]> = of
+        .rows
+        .iter()
+        .filter_map(|row| contact.of_row(row))
+        .collect();
+    let most = |k: usize| {
+        let values = rows
+            .iter()
+            .map(|row| row[k])
+            .filter(|value| value.is_finite());
+        values.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let [largest_force, largest_indentation] = [most(0), most(1)];
+    let column = &report.columns[0];
+    let to_force = match data.columns[0].quantity.rest() {
+        Some(RestQuantity::Force) => 1.0,
+        _ => contact.stiffness,
+    };
+    let known = |key: Key| Some(case.get(key)).filter(|value| value.is_finite());
+    let law = case.stated(Key::SampleLaw).map(|law| law.text());
+    let quantity = data.columns[0].quantity.rest();
+    let attracts = case
+        .cantilever()
+        .and_then(|lever| lever.law.as_ref())
+        .is_some_and(|law| law.entries().any(|entry| entry.attracts));
+    let pull_off = quantity
+        .filter(|_| attracts)
+        .and_then(|quantity| problem.rested(&x, curve)?.pull_off(quantity))
+        .map(|value| value * to_force);
+    let from_header = channels
+        .spring_constant
+        .is_some_and(|k| (k / contact.stiffness - 1.0).abs() < SAME_STIFFNESS);
+    let directions: Vec<Way> = of.rows.iter().filter_map(|row| row.way).collect();
+    let has = |way: Way| directions.contains(&way);
+    let segment = match (has(Way::Approach), has(Way::Retract)) {
+        (true, true) => Some("approach and retract"),
+        (true, false) => Some("approach"),
+        (false, true) => Some("retract"),
+        (false, false) => None,
+    };
+    let law_name = law.as_deref().and_then(|law| LawName::read(law).ok());
+    let uses = |key: Key| law_name.as_ref().is_none_or(|law| law.takes(key));
+    let mut found = FittedForceCurve {
+        curve: of.name.clone(),
+        modulus: of_key(Key::SampleModulus),
+        contact_point,
+        baseline: estimate(&|target| target == Target::Offset(0)),
+        baseline_unit: column.unit.clone(),
+        adhesion_force: pull_off,
+        law,
+        tip_radius: known(Key::TipRadius).filter(|_| uses(Key::TipRadius)),
+        half_angle: known(Key::TipHalfAngle).filter(|_| uses(Key::TipHalfAngle)),
+        poisson: known(Key::SamplePoisson),
+        segment: segment.map(str::to_owned),
+        rows: channels.rows,
+        distance: channels.distance,
+        deflection: channels.deflection,
+        spring_constant: contact.stiffness,
+        spring_constant_from: if from_header { "header" } else { "case" }.to_owned(),
+        spring_constant_in_header: channels.spring_constant,
+        sensitivity_in_header: channels.sensitivity,
+        largest_force,
+        largest_indentation,
+        residual_force: column.residual * to_force,
+        cautions: Vec::new(),
+    };
+    found.cautions = cautions(&found, &rows, attracts);
+    found
+}
+
+/// What to be careful of in a result.
+fn cautions(found: &FittedForceCurve, rows: &[[f64; 2]], attracts: bool) -> Vec<String> {
+    let mut cautions = Vec::new();
+    let length = |value: f64| Kind::Length.format_digits(value, 3);
+    let force = |value: f64| Kind::Force.format_digits(value, 3);
+    let depth = found.largest_indentation;
+    let is_punch = found
+        .law
+        .as_deref()
+        .is_some_and(|law| law.contains("punch"));
+    if let Some(radius) = found.tip_radius
+        && depth > DEEP * radius
+        && !is_punch
+    {
+        cautions.push(format!(
+            "the indentation reaches {}, {:.2} times the tip's radius, where a sphere or parabola of {} \
+             does not describe a tip: fit a shallow part (the option `range`, as in \
+             indentation=\"-1 um:{}\"), or a cone",
+            length(depth),
+            depth / radius,
+            length(radius),
+            length(0.5 * radius)
+        ));
+    }
+    let lowest = rows.iter().map(|row| row[0]).fold(f64::INFINITY, f64::min);
+    if !attracts && -lowest > ADHERES * found.largest_force && -lowest > 4.0 * found.residual_force
+    {
+        cautions.push(format!(
+            "the sample pulls the tip with up to {}, which this law does not describe: fit a law with \
+             adhesion, such as jkr or dmt",
+            force(-lowest)
+        ));
+    }
+    let in_contact = rows.iter().filter(|row| row[1] > 0.0).count();
+    for (count, words) in [
+        (in_contact, "in contact: the modulus rests on few values"),
+        (
+            rows.len() - in_contact,
+            "before contact: the baseline rests on few values",
+        ),
+    ] {
+        if count < MIN_ROWS {
+            cautions.push(format!("only {count} rows are {words}"));
+        }
+    }
+    if let Some(header) = found.spring_constant_in_header
+        && found.spring_constant_from != "header"
+    {
+        cautions.push(format!(
+            "the header of the file has another stiffness of the lever, {}: the modulus is proportional \
+             to it",
+            Kind::Stiffness.format_digits(header, 4)
+        ));
+    }
+    cautions
+}

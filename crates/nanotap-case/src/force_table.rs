@@ -335,7 +335,7 @@ impl Takes {
     /// # Errors
     /// If it cannot be read or is not such a table, with the place.
     pub(crate) fn read_table(self, path: &Path, origin: Origin) -> Result<Value, ForceTableError> {
-        self.of_table(&Table::read_from(path, origin)?)
+        self.of_table(&Table::read_from(path, origin, None)?)
     }
 
     /// The value of a key that takes a table, from the text of an array or of a CSV file.

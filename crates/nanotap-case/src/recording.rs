@@ -12,6 +12,8 @@ use afm_files::{Curve, Document, Format, Segment, Style, recognise};
 const SPRING_CONSTANT: &str = "SpringConstant";
 /// Deflection per volt of the detector, m/V.
 const SENSITIVITY: &str = "InvOLS";
+/// Most numbers of a curve, in all channels: 24 bytes of memory each in a table.
+const MAX_NUMBERS: usize = 8_000_000;
 /// Extensions of files that are not texts, and what such a file is.
 const KINDS: [(&str, &str); 5] = [
     ("ibw", "a curve of Asylum Research (Igor binary wave 5)"),
@@ -37,8 +39,11 @@ pub(super) enum RecordingError {
         images: usize,
         spectra: usize,
     },
-    /// Its first curve has neither an approach nor a retract with numbers.
-    #[error("its first curve has no complete row in approach and retract")]
+    /// Its curve is too long for a table.
+    #[error("its curve has {0} numbers; {MAX_NUMBERS} at most are read")]
+    TooLong(usize),
+    /// Its curve has neither an approach nor a retract with numbers.
+    #[error("its curve has no complete row in approach and retract")]
     NoRows,
 }
 
@@ -66,8 +71,12 @@ fn kind(name: &str) -> Option<&'static str> {
     known.map(|(_, kind)| *kind)
 }
 
-/// Reads the first curve of a file.
-pub(super) fn parse(name: &str, bytes: Vec<u8>) -> Result<Recording, RecordingError> {
+/// Reads a curve of a file, by its number from 0; without one the first.
+pub(super) fn parse(
+    name: &str,
+    bytes: Vec<u8>,
+    number: Option<usize>,
+) -> Result<Recording, RecordingError> {
     if let (None, Some(kind)) = (recognise(&bytes), kind(name)) {
         return Err(RecordingError::Other(kind));
     }
@@ -80,7 +89,12 @@ pub(super) fn parse(name: &str, bytes: Vec<u8>) -> Result<Recording, RecordingEr
             spectra: document.spectra.len(),
         });
     }
-    let curve = document.curve(0)?;
+    let curve = document.curve(number.unwrap_or(0))?;
+    let segments = curve.segments.iter();
+    let numbers = segments.map(|of| of.points() * of.channels.len()).sum();
+    if numbers > MAX_NUMBERS {
+        return Err(RecordingError::TooLong(numbers));
+    }
     let mut recording = Recording::of(&curve);
     recording.keep_whole_rows();
     if recording.columns.iter().all(|(_, of)| of.is_empty()) {
@@ -89,9 +103,13 @@ pub(super) fn parse(name: &str, bytes: Vec<u8>) -> Result<Recording, RecordingEr
     recording.notes = notes(&document, &curve);
     recording.remarks.extend(curve.notes);
     if count > 1 {
-        recording
-            .remarks
-            .push(format!("the first of its {count} curves is read"));
+        let which = number.map_or_else(
+            || "the first of its".to_owned(),
+            |number| format!("curve {number} (from 0) of its"),
+        );
+        recording.remarks.push(format!(
+            "{which} {count} curves is read; the option `curve` selects one"
+        ));
     }
     Ok(recording)
 }
@@ -208,7 +226,7 @@ mod tests {
     }
 
     fn read(name: &str, bytes: Vec<u8>) -> Recording {
-        parse(name, bytes).unwrap_or_else(|error| panic!("{error}"))
+        parse(name, bytes, None).unwrap_or_else(|error| panic!("{error}"))
     }
 
     #[test]
@@ -268,7 +286,7 @@ mod tests {
     #[test]
     fn files_without_curves_are_named() {
         let refused =
-            |name: &str, bytes: Vec<u8>| parse(name, bytes).expect_err("refused").to_string();
+            |name: &str, bytes: Vec<u8>| parse(name, bytes, None).expect_err("refused").to_string();
         assert_eq!(
             refused("a.jpk-force", b"PK".to_vec()),
             "it is not a force curve of JPK, or it is damaged"

@@ -56,15 +56,27 @@ impl Table {
     /// # Errors
     /// When the file cannot be read or is not such a table; the message has line and column.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        Self::read_from(path, Origin::User)
+        Self::read_from(path, Origin::User, None)
+    }
+
+    /// As [`read`](Self::read), with the curve of this number, from 0, of an instrument's file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), and if there is no such curve.
+    pub fn read_curve(path: &Path, number: usize) -> Result<Self, Error> {
+        Self::read_from(path, Origin::User, Some(number))
     }
 
     /// As [`read`](Self::read), of a file that the user or another file names.
-    pub(crate) fn read_from(path: &Path, origin: Origin) -> Result<Self, Error> {
+    pub(crate) fn read_from(
+        path: &Path,
+        origin: Origin,
+        curve: Option<usize>,
+    ) -> Result<Self, Error> {
         let name = path.display().to_string();
         let bytes = input::read(path, MAX_TABLE_BYTES, origin)?;
         if recording::is_recording(&name, &bytes) {
-            let recorded = recording::parse(&name, bytes);
+            let recorded = recording::parse(&name, bytes, curve);
             return recorded
                 .map(|recorded| Self::of_recording(&name, recorded))
                 .map_err(|error| {
@@ -73,6 +85,13 @@ impl Table {
                         "export the curve as text, with the names of the columns in the first line",
                     )
                 });
+        }
+        if curve.is_some_and(|number| number > 0) {
+            return Err(Error::option(
+                "curve",
+                format!("{name} is a table, which has no numbered curves"),
+                "leave {curve} out, or fit one curve of a table with a column `curve`",
+            ));
         }
         let text = text_of(bytes).ok_or_else(|| {
             Error::input(
@@ -115,11 +134,13 @@ impl Table {
             Cow::Borrowed(text)
         };
         let separator = delimiter(text);
-        let mut reader = csv::ReaderBuilder::new()
+        let content = text.trim_start_matches('\u{feff}').as_bytes();
+        let mut configured = csv::ReaderBuilder::new();
+        configured
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
-            .delimiter(separator)
-            .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+            .delimiter(separator);
+        let mut reader = configured.from_reader(content);
         let refuse = |error: &csv::Error| {
             let line = error.position().map_or(1, csv::Position::line);
             let what = match error.kind() {
@@ -147,49 +168,67 @@ impl Table {
                 "name the columns in the first line, each with its unit, as in `distance (nm)`",
             ));
         }
-        let mut records = Vec::new();
-        for record in reader.into_records() {
-            if (records.len() + 1) * header.len() > MAX_ENTRIES {
+        // Two passes keep the numbers alone in memory.
+        let first = reader.position().clone();
+        let mut record = csv::StringRecord::new();
+        let mut commas = Commas::default();
+        let mut units = None;
+        let mut rows = 0;
+        while reader
+            .read_record(&mut record)
+            .map_err(|error| refuse(&error))?
+        {
+            if rows == 0 && is_units(&record) {
+                units = Some(record.clone());
+            } else {
+                record.iter().for_each(|field| commas.see(field));
+            }
+            rows += 1;
+            if rows * header.len() > MAX_ENTRIES {
                 return Err(Error::input(
                     format!("{name} has more than {MAX_ENTRIES} entries"),
                     "keep fewer columns or rows",
                 ));
             }
-            if records.len() == MAX_ROWS {
+            if rows - usize::from(units.is_some()) > MAX_ROWS {
                 return Err(Error::input(
                     format!("{name} has more than {MAX_ROWS} rows"),
                     "keep fewer",
                 ));
             }
-            records.push(record.map_err(|error| refuse(&error))?);
         }
-        let has_units = records.first().is_some_and(is_units);
-        let unit_of = |column: usize| {
-            let units = records.first().filter(|_| has_units)?;
-            units.get(column).map(unit)
-        };
+        let unit_of = |column: usize| units.as_ref()?.get(column).map(unit);
+        let rows = rows - usize::from(units.is_some());
         let named = header.iter().enumerate().map(|(column, word)| {
             let own = Header::of(word).unit;
-            match unit_of(column).filter(|unit| own.is_empty() && !unit.is_empty()) {
-                Some(unit) => (format!("{word} ({unit})"), Vec::new()),
-                None => (word.to_owned(), Vec::new()),
-            }
+            let unit = unit_of(column).filter(|unit| own.is_empty() && !unit.is_empty());
+            let header = unit.map_or_else(|| word.to_owned(), |unit| format!("{word} ({unit})"));
+            (header, Vec::with_capacity(rows))
         });
         let mut table = Self {
             name: name.to_owned(),
             columns: named.collect(),
+            lines: Vec::with_capacity(rows),
             ..Self::default()
         };
-        let rows = &records[usize::from(has_units)..];
-        let has_commas = has_decimal_commas(rows, separator);
+        let has_commas = commas.are_decimal(separator);
         if has_commas {
             let note = "numbers are read with decimal commas".to_owned();
             table.notes.push((DECIMAL_COMMAS.to_owned(), note));
         }
-        for record in rows {
+        let rest = &content[first.byte() as usize..];
+        let mut reader = configured.has_headers(false).from_reader(rest);
+        let mut skip = units.is_some();
+        while reader
+            .read_record(&mut record)
+            .map_err(|error| refuse(&error))?
+        {
+            if std::mem::take(&mut skip) {
+                continue;
+            }
             let line = record.position().map_or(0, csv::Position::line);
-            table.lines.push(line);
-            for ((_, column), field) in table.columns.iter_mut().zip(record) {
+            table.lines.push(line + first.line() - 1);
+            for ((_, column), field) in table.columns.iter_mut().zip(&record) {
                 let number = decimal(field).filter(|_| has_commas && field.contains(','));
                 column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
             }
@@ -342,26 +381,36 @@ fn decimal(field: &str) -> Option<f64> {
     field.replacen(',', ".", 1).parse().ok()
 }
 
-/// Whether commas in the numbers of these rows are decimal commas. They are not if another number
-/// has a decimal point, or if all of them may group thousands in a table whose separator is a comma.
-fn has_decimal_commas(rows: &[csv::StringRecord], separator: u8) -> bool {
-    let may_group = |field: &str| {
-        let unsigned = field.trim_start_matches(['-', '+']);
-        let (whole, part) = unsigned.split_once(',')?;
-        Some((1..=3).contains(&whole.len()) && !whole.starts_with('0') && part.len() == 3)
-    };
-    let has_point =
-        |field: &str| field.contains('.') && field.replace(',', "").parse::<f64>().is_ok();
-    let fields = || rows.iter().flatten();
-    let mut commas = fields()
-        .filter(|f| decimal(f).is_some())
-        .filter_map(may_group);
-    let is_decimal = if separator == b',' {
-        commas.any(|may_group| !may_group)
-    } else {
-        commas.next().is_some()
-    };
-    is_decimal && !fields().any(has_point)
+/// What commas in the numbers of a table may be.
+#[derive(Clone, Copy, Debug, Default)]
+struct Commas {
+    /// A comma that may group thousands, and one that may not.
+    groups: bool,
+    separates: bool,
+    /// A number with a decimal point.
+    has_point: bool,
+}
+
+impl Commas {
+    fn see(&mut self, field: &str) {
+        if field.contains(',') && decimal(field).is_some() {
+            let unsigned = field.trim_start_matches(['-', '+']);
+            let (whole, part) = unsigned.split_once(',').unwrap_or_default();
+            let may_group =
+                (1..=3).contains(&whole.len()) && !whole.starts_with('0') && part.len() == 3;
+            self.groups |= may_group;
+            self.separates |= !may_group;
+        }
+        self.has_point |=
+            !self.has_point && field.contains('.') && field.replace(',', "").parse::<f64>().is_ok();
+    }
+
+    /// Whether they are decimal commas. They are not if another number has a decimal point, or if all of
+    /// them may group thousands in a table whose separator is a comma.
+    const fn are_decimal(self, separator: u8) -> bool {
+        let is_decimal = self.separates || (self.groups && separator != b',');
+        is_decimal && !self.has_point
+    }
 }
 
 /// A unit in the row under the header, without brackets.
@@ -458,5 +507,33 @@ impl JsonSchema for Table {
             },
             "required": ["columns"],
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_keep_their_lines_below_comments_and_units() {
+        let text = "# made by hand\nz,d\nnm,nm\n1,2\n# a comment\n3,\n";
+        let table = Table::parse("t", text).unwrap();
+        assert_eq!(table.columns[0].0, "z (nm)");
+        assert_eq!(table.columns[0].1, [Entry::Number(1.0), Entry::Number(3.0)]);
+        assert_eq!(table.columns[1].1, [Entry::Number(2.0), Entry::Missing]);
+        assert_eq!(table.lines, [4, 6]);
+        let error = Table::parse("t", "z,d\n1,2\n3\n").unwrap_err();
+        assert!(error.message().contains("line 3"), "{}", error.message());
+    }
+
+    #[test]
+    fn commas_are_decimal_where_they_cannot_be_anything_else() {
+        let first = |text: &str| Table::parse("t", text).unwrap().columns[0].1[0].clone();
+        assert_eq!(first("z;d\n1,5;2\n"), Entry::Number(1.5));
+        assert_eq!(first("z;d\n1,500;2\n"), Entry::Number(1.5));
+        assert_eq!(first("z,d\n\"1,5\",2\n"), Entry::Number(1.5));
+        // It may group thousands, and the separator is a comma.
+        assert_eq!(first("z,d\n\"1,500\",2\n"), Entry::Text("1,500".to_owned()));
+        assert_eq!(first("z;d\n1,500;2.5\n"), Entry::Text("1,500".to_owned()));
     }
 }

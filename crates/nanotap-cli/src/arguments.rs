@@ -32,10 +32,11 @@ pub(crate) struct CaseArguments {
     pub(crate) model_units: bool,
 }
 
-/// Reads measured curves for `command`.
+/// Reads measured curves for `command`, of each file the first curve or the one with this number.
 pub(crate) fn measured(
     first: &PathBuf,
     also: &[PathBuf],
+    curve: Option<usize>,
     command: &str,
 ) -> Result<Vec<Table>, Failure> {
     let read = |path: &PathBuf| {
@@ -46,7 +47,11 @@ pub(crate) fn measured(
             ));
         }
         // A file that cannot be read is bad input, as a case file is.
-        Table::read(path).map_err(|error| Failure {
+        let table = match curve {
+            Some(number) => Table::read_curve(path, number),
+            None => Table::read(path),
+        };
+        table.map_err(|error| Failure {
             kind: ErrorKind::BadInput,
             ..error
         })

@@ -9,6 +9,7 @@ use nanotap::case::file::Source;
 use nanotap::case::physical::{Catalogue, Kind, Severity};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
+use nanotap::study::fit::{FitOptions, implied_words};
 use nanotap::study::setpoint::{self, SetpointReport};
 
 use crate::arguments::CaseArguments;
@@ -78,6 +79,23 @@ impl GivenCase {
     /// Reads the case of the arguments without printing anything.
     pub(crate) fn silent(arguments: &CaseArguments) -> Result<Self, Failure> {
         case_of(arguments).map(Self)
+    }
+
+    /// Reads the case of the arguments for a fit without printing anything, with what it lacks and the
+    /// data or the options state; returns what is assumed.
+    pub(crate) fn of_data(
+        arguments: &CaseArguments,
+        request: &FitOptions,
+    ) -> Result<(Self, Vec<String>), Failure> {
+        let catalogue = catalogue(&arguments.catalogue)?;
+        let load = |words: &[String]| {
+            let words = [arguments.set.as_slice(), words].concat();
+            Case::load(arguments.file.as_deref(), &words, &catalogue)
+        };
+        let implied = implied_words(request, &arguments.set, load)?;
+        let mut arguments = arguments.clone();
+        arguments.set.extend(implied.words);
+        Ok((Self::silent(&arguments)?, implied.notes))
     }
 
     fn warned(case: Case, output: &Output) -> Self {

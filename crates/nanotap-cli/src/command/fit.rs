@@ -4,10 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::Key;
+use nanotap::case::physical::Kind;
 use nanotap::dataset::Share;
 use nanotap::figure::fit::{FitMaps, fit_figure};
 use nanotap::study::DatasetStudy as _;
-use nanotap::study::fit::{FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedParameter};
+use nanotap::study::fit::{
+    Estimate, FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve,
+    FittedParameter,
+};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, PlotArgument, measured};
@@ -34,6 +38,10 @@ pub(crate) struct Arguments {
     /// Another measured curve, fitted together with the first; may be repeated
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
+
+    /// Number of the curve of an instrument's file with several, from 0 [default: the first]
+    #[arg(long, value_name = "K")]
+    curve: Option<usize>,
 
     #[command(flatten)]
     request: Request<FitOptions>,
@@ -80,10 +88,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         None => None,
     };
     arguments.plot.check()?;
-    request.data = measured(&arguments.data, &arguments.also, "fit")?;
-    let case = GivenCase::silent(&arguments.case)?;
+    request.data = measured(&arguments.data, &arguments.also, arguments.curve, "fit")?;
+    let (case, assumed) = GivenCase::of_data(&arguments.case, &request)?;
     case.note_replaced(output);
-    let report = progress::study::<FitStudy>(&case, &request, &arguments.threads)?;
+    let mut report = progress::study::<FitStudy>(&case, &request, &arguments.threads)?;
+    report.preparation.splice(0..0, assumed);
     // Values that a fit starts from are not those of the sample.
     case.warn_of_result(&report.case_file, &arguments.case, output)?;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
@@ -129,7 +138,7 @@ fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Resu
         ));
     };
     file::ending(path, &["zarr", "csv"])?;
-    request.data = measured(&arguments.data, &arguments.also, "fit")?;
+    request.data = measured(&arguments.data, &arguments.also, arguments.curve, "fit")?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
     let dataset = DatasetArguments {
         out: Some(path.clone()),
@@ -244,6 +253,111 @@ fn laws(report: &FitReport) -> String {
     text
 }
 
+/// A value with its standard error, in so many digits that the error has two.
+fn plus_minus(kind: Kind, value: f64, error: Option<f64>) -> String {
+    let Some(error) = error.filter(|error| *error > 0.0) else {
+        return kind.format_digits(value, 5);
+    };
+    let digits = (value.abs() / error).log10().ceil() + 2.0;
+    let value = kind.format_digits(value, digits.clamp(3.0, 12.0) as usize);
+    format!("{value} ± {}", kind.format_digits(error, 2))
+}
+
+/// What a fit of a force curve says of sample and contact.
+fn force_curve(of: &FittedForceCurve) -> String {
+    let mut table = Table::new([("", Align::Left), ("", Align::Left)]);
+    let estimate = |kind: Kind, found: &Estimate| {
+        let ends = found
+            .interval
+            .map(|end| end.map(|end| kind.format_digits(end, 4)));
+        let interval = match ends {
+            [Some(low), Some(high)] => format!(" (95 %: {low} to {high})"),
+            _ => String::new(),
+        };
+        plus_minus(kind, found.value, found.standard_error) + &interval
+    };
+    if let Some(modulus) = &of.modulus {
+        table.row(["Young's modulus", &estimate(Kind::Pressure, modulus)]);
+    }
+    if let Some(contact) = &of.contact_point {
+        let place = plus_minus(Kind::Length, contact.value, contact.standard_error);
+        table.row(["contact point", &format!("{place} on `{}`", of.distance)]);
+    }
+    if let Some(baseline) = &of.baseline {
+        let kind = Kind::of_si_unit(&of.baseline_unit).unwrap_or(Kind::Number);
+        let value = plus_minus(kind, baseline.value, baseline.standard_error);
+        table.row(["baseline", &format!("{value} of `{}`", of.deflection)]);
+    }
+    if let Some(force) = of.adhesion_force {
+        table.row([
+            "adhesion",
+            &format!(
+                "{}, the pull-off force",
+                Kind::Force.format_digits(-force, 4)
+            ),
+        ]);
+    }
+    let sizes = [
+        ("tip radius", Kind::Length, of.tip_radius),
+        ("half angle", Kind::Angle, of.half_angle),
+        ("Poisson's ratio", Kind::Number, of.poisson),
+    ];
+    let sizes = sizes.into_iter().filter_map(|(name, kind, value)| {
+        Some(format!("{name} {}", kind.format_digits(value?, 5)))
+    });
+    let law = of.law.as_deref().unwrap_or("linear contact").to_owned();
+    let model: Vec<String> = std::iter::once(law).chain(sizes).collect();
+    table.row(["law", &model.join(", ")]);
+    let segment = of.segment.as_deref().unwrap_or("all");
+    let rows = number::counted(of.rows, "row", "rows");
+    table.row([
+        "fitted",
+        &format!(
+            "{segment}, {rows}: `{}` against `{}`",
+            of.deflection, of.distance
+        ),
+    ]);
+    let from = match of.spring_constant_from.as_str() {
+        "header" => "from the file's header",
+        _ => "stated",
+    };
+    let k = Kind::Stiffness.format_digits(of.spring_constant, 5);
+    let sensitivity = of.sensitivity_in_header.map_or_else(String::new, |of| {
+        format!(
+            "; InvOLS {} nm/V in the header",
+            number::significant(1e9 * of, 4)
+        )
+    });
+    table.row(["lever", &format!("k = {k} {from}{sensitivity}")]);
+    table.row([
+        "up to",
+        &format!(
+            "{} at an indentation of {}",
+            Kind::Force.format_digits(of.largest_force, 4),
+            Kind::Length.format_digits(of.largest_indentation, 4)
+        ),
+    ]);
+    table.row([
+        "misfit",
+        &format!(
+            "{} (root mean square), {} % of the largest force",
+            Kind::Force.format_digits(of.residual_force, 3),
+            number::significant(100.0 * of.residual_force / of.largest_force, 2)
+        ),
+    ]);
+    let mut text = table.render();
+    text.push('\n');
+    for caution in &of.cautions {
+        text.push_str(&motion::paragraph(&format!("be careful: {caution}")));
+    }
+    text.push_str(&motion::paragraph(
+        "The errors are those of this curve alone. The modulus is proportional to the stiffness of the \
+         lever, which is rarely known better than 10 %, and depends on its sensitivity and on the tip.",
+    ));
+    text.push('\n');
+    text
+}
+
 fn text(case: &GivenCase, report: &FitReport) -> String {
     let curves: std::collections::BTreeSet<&str> =
         report.rows.iter().map(|row| row.curve.as_str()).collect();
@@ -257,6 +371,12 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
     let mut text = format!("{}\n\n", style::bold(&heading));
     if !report.laws.is_empty() {
         text.push_str(&laws(report));
+    }
+    for of in &report.force_curves {
+        if report.force_curves.len() > 1 {
+            text.push_str(&format!("{}\n", style::bold(&of.curve)));
+        }
+        text.push_str(&force_curve(of));
     }
     let mut table = Table::new([
         ("parameter", Align::Left),

@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (mut options, case) = arguments.study.read(output)?;
-    options.data = measured(&arguments.data, &arguments.also, "reconstruct")?;
+    options.data = measured(&arguments.data, &arguments.also, None, "reconstruct")?;
     let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
     arguments.study.write(&case, &report)?;
     for remark in &report.remarks {

@@ -23,6 +23,7 @@
 //! belong to a motion that is not periodic.
 
 mod baseline;
+mod blocks;
 mod branches;
 mod data;
 mod force_curve;
@@ -317,7 +318,10 @@ fn with_search<R>(
         ));
     }
     let columns = names(&request.columns);
-    let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
+    let averaged = blocks::averaged(&request.data, request.rows);
+    let tables = averaged.as_ref().unwrap_or(&request.data);
+    let measured = instrument::prepared(case, tables, &request.convert, &columns)?;
+    drop(averaged);
     let mut preparation = measured.notes;
     let mut channels = measured.channels;
     let mut data = Data::read(case, &measured.tables, &measured.columns)?;

@@ -349,7 +349,7 @@ fn bound(
 const PHYSICAL: [(Key, f64, f64); 11] = [
     (Key::TipRadius, 1e-10, 1e-3),
     (Key::TipModulus, 1e4, 1e13),
-    (Key::SampleModulus, 1e2, 1e13),
+    (Key::SampleModulus, 1.0, 1e13),
     (Key::SampleStiffness, 0.0, 1e7),
     (Key::SampleDamping, 0.0, 1e3),
     (Key::SampleLossTangent, 0.0, 1e3),

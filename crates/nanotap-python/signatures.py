@@ -153,12 +153,21 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         ),
     ),
     "fit": (
-        (THREADS, PROGRESS),
+        (
+            (
+                "curve",
+                "int | None",
+                "None",
+                "Number of the curve of an instrument's file with several, from 0; default: the first.",
+            ),
+            THREADS,
+            PROGRESS,
+        ),
         "Fit",
         (
             "`parameters` (key, value, standard_error, interval, unit), `chi2`, `undetermined`, "
-            "`correlations`, the `rows` with model and residuals; `best` and `errors` by key, and "
-            "`best_case()`, the case of the best fit."
+            "`correlations`, the `rows` with model and residuals; `force_curves`, what each force curve "
+            "says of the sample; `best` and `errors` by key, and `best_case()`, the case of the best fit."
         ),
     ),
     "reconstruct": (
@@ -322,6 +331,17 @@ DOCUMENT = (
     "The document, with the names of the terminal's JSON; `.to_dataframe()`, `.ds` and `.plot()`.",
 )
 
+# The first argument of a study, where it may be something else than a case.
+FIRST = {
+    "fit": (
+        "Case | Path | Any",
+        (
+            "The case, or the path of its file; or, without `data`, the measured curve itself, of which "
+            "a force curve needs no case: the file's header has the lever, `tip_radius` states the tip."
+        ),
+    ),
+}
+
 # Studies that run over arrays of parameters.
 OVER_ARRAYS = {"simulate", "orbit"}
 
@@ -386,6 +406,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     options = schema["properties"]
     required = set(schema.get("required", ()))
     extra, result, returns = PYTHON.get(name, DOCUMENT)
+    first = FIRST.get(name, ("Case", "The case."))
     arguments, documents = [], []
     for option, declared in options.items():
         argument = argument_name(option)
@@ -416,7 +437,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     def signature(keys: str, type_: str) -> str:
         tail = [f"    **parameters: {keys},"] if keys else []
         star = ["    *,"] if arguments else []
-        lines = ["    case: Case,", *star, *arguments, *tail]
+        lines = [f"    case: {first[0]},", *star, *arguments, *tail]
         return "\n".join([f"def {python}(", *lines, f") -> {type_}:"])
 
     module = "_studies"
@@ -431,7 +452,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     call += ", parameters)" if arrays else ")"
     body = "\n".join(
         [
-            docstring(about, documents, returns, EXAMPLES.get(name, "")),
+            docstring(about, first, documents, returns, EXAMPLES.get(name, "")),
             f'    options = _arguments.options("{name}", locals())',
             call,
         ]
@@ -564,7 +585,11 @@ def in_python(text: str) -> str:
 
 
 def docstring(
-    about: str, documents: list[tuple[str, str, str]], returns: str, example: str
+    about: str,
+    first: tuple[str, str],
+    documents: list[tuple[str, str, str]],
+    returns: str,
+    example: str,
 ) -> str:
     """In numpy's style."""
 
@@ -576,8 +601,8 @@ def docstring(
     lines = [
         "    Parameters",
         "    ----------",
-        "    case : Case",
-        "        The case.",
+        f"    case : {first[0]}",
+        indented(first[1]),
     ]
     for argument, kind, text in documents:
         lines += [f"    {argument} : {kind}", indented(text)]

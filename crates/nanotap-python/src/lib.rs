@@ -58,6 +58,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(study::report_schema, module)?,
         wrap_pyfunction!(study::table, module)?,
         wrap_pyfunction!(study::calibrate, module)?,
+        wrap_pyfunction!(study::implied_case, module)?,
         wrap_pyfunction!(study::lyapunov, module)?,
         wrap_pyfunction!(study::paper, module)?,
         wrap_pyfunction!(study::paper_sections, module)?,

@@ -6,9 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nanotap::Error;
 use nanotap::case::Case;
+use nanotap::case::physical::Catalogue;
 use nanotap::frame::{Cell, Column, Frame};
 use nanotap::study::calibrate::{CalibrateOptions, calibrate_file, calibrate_table};
-use nanotap::study::fit::Table;
+use nanotap::study::fit::{FitOptions, Table, implied_words};
 use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
 use nanotap::study::registry::{self, Answer, Document, Study, StudyEntry};
 use nanotap::study::request::read;
@@ -210,13 +211,30 @@ pub(crate) fn calibrate(
     Ok(done.result)
 }
 
-/// A table of measured values from a CSV file, as JSON, with the line of each row.
+/// A table of measured values from a CSV file or an instrument's file, of which the first curve or the
+/// one with this number, as JSON, with the line of each row.
 #[pyfunction]
-pub(crate) fn table(path: PathBuf) -> PyResult<String> {
-    let table = Table::read(&path).map_err(Failure::from)?;
+#[pyo3(signature = (path, curve=None))]
+pub(crate) fn table(path: PathBuf, curve: Option<usize>) -> PyResult<String> {
+    let table = match curve {
+        Some(number) => Table::read_curve(&path, number),
+        None => Table::read(&path),
+    };
+    let table = table.map_err(Failure::from)?;
     let mut value = serde_json::to_value(&table).map_err(Failure::from)?;
     value["lines"] = json!(table.lines);
     Ok(value.to_string())
+}
+
+/// The case of a force curve without one, from the request of its fit: `key=value` words, and sentences
+/// on what is assumed.
+#[pyfunction]
+pub(crate) fn implied_case(request: &str) -> PyResult<(Vec<String>, Vec<String>)> {
+    let request: FitOptions = read(json(request)?).map_err(Failure::from)?;
+    let catalogue = Catalogue::shared();
+    let load = |words: &[String]| Case::parse_with(None, words, &catalogue);
+    let implied = implied_words(&request, &[], load).map_err(Failure::from)?;
+    Ok((implied.words, implied.notes))
 }
 
 /// The JSON of a request.

@@ -13,6 +13,7 @@ mod experiments;
 mod files;
 mod front_page;
 mod instrument_files;
+mod instrument_fits;
 #[cfg(unix)]
 mod interruptions;
 #[cfg(unix)]

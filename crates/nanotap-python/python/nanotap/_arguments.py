@@ -347,12 +347,12 @@ def names(name: str, value: Any) -> list[str]:
     return list(given)
 
 
-def tables(data: Any) -> list[dict[str, Any]]:
-    """Measured curves as tables: files, mappings of columns, data frames, datasets, computed force
-    curves, or several.
+def tables(data: Any, curve: int | None = None) -> list[dict[str, Any]]:
+    """Measured curves as tables: files (of an instrument's file the first curve or the one with this
+    number), mappings of columns, data frames, datasets, computed force curves, or several.
     """
     if isinstance(data, str | os.PathLike):
-        table: dict[str, Any] = json.loads(_nanotap.table(existing(data)))
+        table: dict[str, Any] = json.loads(_nanotap.table(existing(data), curve))
         return [table]
     if hasattr(data, "data_vars"):  # xarray
         return [{"columns": _of_dataset(data)}]
@@ -388,7 +388,7 @@ def tables(data: Any) -> list[dict[str, Any]]:
         )
         raise TypeError(message)
     if isinstance(data, Iterable):
-        many = [table for one in data for table in tables(one)]
+        many = [table for one in data for table in tables(one, curve)]
         return [
             {**table, "name": table.get("name", f"curve {k + 1}")}
             for k, table in enumerate(many)

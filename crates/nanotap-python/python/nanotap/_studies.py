@@ -458,19 +458,35 @@ def document(
 
 @stoppable()
 def fit(
-    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+    case: Any,
+    options: Mapping[str, Any],
+    curve: int | None,
+    threads: int | None,
+    progress: Progress,
 ) -> Fit:
-    """The parameters that describe measured curves best."""
-    if options["data"] is None:
+    """The parameters that describe measured curves best; `case` may be a case, its file, or the data."""
+    data = options["data"]
+    if data is None and isinstance(case, Case):
         message = "data: expected measured curves"
         raise TypeError(message)
+    if data is None:
+        case, data = None, case
+    elif isinstance(case, str | os.PathLike):
+        case = Case.from_file(case)
     lists = {
         name: _arguments.names(name, options[name])
         for name in ("free", "per_curve", "columns", "convert", "start", "pixels")
         if options[name] is not None
     }
-    asked = {**options, **lists, "data": _arguments.tables(options["data"])}
+    number = _arguments.optional_count("curve", curve)
+    asked = {**options, **lists, "data": _arguments.tables(data, number)}
+    assumed: list[str] = []
+    if case is None:
+        words, assumed = _nanotap.implied_case(_arguments.request("fit", asked))
+        case = Case(**dict(word.split("=", 1) for word in words))
     document, answer, units, interrupted = _run("fit", case, asked, threads, progress)
+    if assumed:
+        document["preparation"] = [*assumed, *document.get("preparation", ())]
     return _finished(Fit(document, answer, units, ("fit", "")), interrupted)
 
 

@@ -369,7 +369,7 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
         number::counted(curves.len(), "curve", "curves"),
     );
     let mut text = format!("{}\n\n", style::bold(&heading));
-    if !report.laws.is_empty() {
+    if report.laws.len() > 1 {
         text.push_str(&laws(report));
     }
     for of in &report.force_curves {

@@ -8,10 +8,11 @@ use nanotap_case::table::{Entry, Header, Table};
 /// Tables of force curves with more rows are averaged to about this number.
 const MAX_ROWS: usize = 20_000;
 
-/// The tables with the long ones averaged; `None` if there are none, or if `rows`, the option of that
+/// The tables, of which `columns` are used, with the long ones averaged; `None` if there are none, or if `rows`, the option of that
 /// name, is 0: then every row counts.
-pub(super) fn averaged(tables: &[Table], rows: usize) -> Option<Vec<Table>> {
-    let is_long = |table: &Table| table.rows() > 2 * MAX_ROWS && is_plain_force_curve(table);
+pub(super) fn averaged(tables: &[Table], columns: &[String], rows: usize) -> Option<Vec<Table>> {
+    let is_long =
+        |table: &Table| table.rows() > 2 * MAX_ROWS && is_plain_force_curve(table, columns);
     if rows == 0 || !tables.iter().any(is_long) {
         return None;
     }

@@ -30,6 +30,8 @@ const VALUES: [(Key, &str); 9] = [
     (Key::SampleAdhesionForce, "sample.adhesion_force=1 nN"),
     (Key::SampleHamaker, "sample.hamaker=100 zJ"),
 ];
+/// The adhesion from which a fit starts where a law needs one and none is stated, in SI.
+pub(super) const ADHESION: [(Key, f64); 1] = [(Key::SampleWorkOfAdhesion, 1e-3)];
 /// Most words that are added to a case.
 const MAX_WORDS: usize = 16;
 
@@ -94,13 +96,27 @@ pub fn implied_words(
     load: impl Fn(&[String]) -> Result<Case, CaseFileError>,
 ) -> Result<ImpliedWords, Error> {
     let mut implied = ImpliedWords::default();
-    let is_force_curve = !request.data.is_empty() && request.data.iter().all(is_plain_force_curve);
-    if !is_force_curve {
-        return Ok(implied);
-    }
     let Err(error) = load(&[]) else {
         return Ok(implied);
     };
+    let columns = names(&request.columns);
+    let other = request
+        .data
+        .iter()
+        .find(|table| !is_plain_force_curve(table, &columns));
+    if let Some(table) = other {
+        let states_tip = request.tip_radius.is_some() || request.half_angle.is_some();
+        if states_tip && error.source.is_none() && words.is_empty() {
+            return Err(Error::input(
+                format!(
+                    "{}: its columns are not those of a force curve alone, and other curves need a case",
+                    table.name
+                ),
+                "select distance and deflection with {columns}, or give a case with lever and drive",
+            ));
+        }
+        return Ok(implied);
+    }
     let begins = |starts: &[&str]| {
         let mut words = words.iter();
         words.any(|word| {

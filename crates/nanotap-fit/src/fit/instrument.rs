@@ -719,9 +719,18 @@ fn distance_of_separation(
     Ok(())
 }
 
-/// Whether a table is a force curve, by the names of its columns: the lever does not oscillate.
-pub(super) fn is_plain_force_curve(table: &Table) -> bool {
-    is_force_curve(table) && !oscillates(table)
+/// Whether a table as it is written is a force curve, by the names of its columns, of which `columns` are
+/// used, or all: there is a deflection, and nothing of an oscillation.
+pub(super) fn is_plain_force_curve(table: &Table, columns: &[String]) -> bool {
+    let chosen = table.columns.iter().filter(|(w, _)| is_chosen(w, columns));
+    let names: Vec<String> = chosen.map(|(w, _)| plain(&Header::of(w).name)).collect();
+    let known = |name: &String| {
+        let known = NAMES.iter().find(|(own, _)| own == name);
+        let name = known.map_or(name.as_str(), |(_, name)| name);
+        Quantity::named(name, true)
+    };
+    let mut found = names.iter().filter_map(known).peekable();
+    found.peek().is_some() && found.all(|quantity| quantity.rest().is_some())
 }
 
 /// Direction of the distance of a force curve, and where it turns. Returns whether the distance is

@@ -1,7 +1,7 @@
 //! Fits of the same data under several contact laws.
 
 use super::report::{ComparedLaw, FitReport};
-use super::{FitOptions, fit_one, names};
+use super::{FitOptions, fit_one, implied_case, names};
 use nanotap_case::under_law::LawName;
 use nanotap_case::{Case, Key};
 use nanotap_dynamics::control::Control;
@@ -40,7 +40,10 @@ pub(super) fn compare(
             }
         }
     }
-    let begins = middles(request);
+    let mut begins = middles(request);
+    if request.free.is_empty() && request.per_curve.is_empty() {
+        begins.extend(implied_case::ADHESION);
+    }
     let mut found: Vec<(String, Result<FitReport, Error>)> = Vec::new();
     for law in &laws {
         if control.is_cancelled() {

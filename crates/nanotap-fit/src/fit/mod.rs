@@ -236,7 +236,9 @@ pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
 /// The segment that all laws of a request describe; that of the request, if the data are not force
 /// curves.
 fn segment_of_laws(case: &Case, request: &FitOptions) -> Option<Segment> {
-    let of_force_curves = request.data.iter().all(instrument::is_plain_force_curve);
+    let columns = names(&request.columns);
+    let is_force_curve = |table: &Table| instrument::is_plain_force_curve(table, &columns);
+    let of_force_curves = request.data.iter().all(is_force_curve);
     let default = || of_force_curves.then(|| selection::default_segment(case, request));
     request.segment.or_else(default)
 }
@@ -318,7 +320,7 @@ fn with_search<R>(
         ));
     }
     let columns = names(&request.columns);
-    let averaged = blocks::averaged(&request.data, request.rows);
+    let averaged = blocks::averaged(&request.data, &columns, request.rows);
     let tables = averaged.as_ref().unwrap_or(&request.data);
     let measured = instrument::prepared(case, tables, &request.convert, &columns)?;
     drop(averaged);

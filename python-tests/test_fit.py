@@ -126,6 +126,33 @@ def test_a_computed_force_curve_is_a_table() -> None:
         nanotap.fit(case("50 MPa"), data=driven, free=["sample.modulus"])
 
 
+GEL = Path(__file__).parents[1] / "docs" / "cases" / "gel.csv"
+
+
+def test_a_force_curve_needs_no_case() -> None:
+    # Computed with 5 kPa, a sphere of 5 um, 0.05 N/m and the contact point at 12 um.
+    found = nanotap.fit(GEL, tip_radius="5 um")
+    [curve] = found.force_curves
+    assert curve.modulus.value == pytest.approx(5e3, rel=0.02)
+    assert curve.contact_point.value == pytest.approx(12e-6, abs=10e-9)
+    assert (curve.segment, curve.spring_constant_from) == ("approach", "header")
+    assert any("Hertz" in note for note in found.preparation)
+    # The same from a data frame, whose attributes are the header.
+    pytest.importorskip("pandas")
+    again = nanotap.fit(nanotap.read(GEL), tip_radius=5e-6)
+    assert again.best == found.best
+    both = nanotap.fit(GEL, tip_radius="5 um", segment="both", poisson=0.3)
+    ratio = both.force_curves[0].modulus.value / curve.modulus.value
+    assert both.force_curves[0].segment == "approach and retract"
+    assert ratio == pytest.approx((1 - 0.3**2) / (1 - 0.5**2), rel=0.02)
+    with pytest.raises(ValueError, match="tip_radius"):
+        nanotap.fit(GEL)
+    with pytest.raises(ValueError, match="spring_constant"):
+        nanotap.fit({"z (nm)": [1, 2], "deflection (nm)": [1, 2]}, tip_radius=1e-6)
+    with pytest.raises(ValueError, match="range"):
+        nanotap.fit(GEL, tip_radius="5 um", range={"depth": ("1 nm", "2 nm")})
+
+
 def test_what_is_no_table_is_refused(curve: dict[str, np.ndarray]) -> None:
     case = nanotap.Case.from_toml(LEVER)
     with pytest.raises(TypeError, match="data"):

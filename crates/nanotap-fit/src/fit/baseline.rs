@@ -27,8 +27,8 @@ const FIRST: f64 = 0.1;
 const OFF: f64 = 4.0;
 /// Factors of the stiffness of the contact, as powers of ten: up to this, in steps of this.
 const DECADES: (f64, f64) = (5.0, 0.25);
-/// A scan counts if it lowers the cost by this factor.
-const BETTER: f64 = 0.8;
+/// A scan counts if it lowers the cost by this factor: of many rows few may be in contact.
+const BETTER: f64 = 0.999;
 /// Rounds in which the pull-off force and its parameter meet, to a part of it; least power with which
 /// one changes with the other, and the inverse of the largest.
 const ROUNDS: usize = 12;

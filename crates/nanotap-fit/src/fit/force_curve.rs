@@ -4,10 +4,11 @@
 use super::data::Data;
 use super::instrument::Channels;
 use super::parameters::Target;
+use super::problem::Problem;
 use super::quantity::RestQuantity;
 use super::report::{Estimate, FitReport, FittedForceCurve};
 use super::search::Search;
-use super::selection::Contact;
+use super::selection::{self, Contact};
 use nanotap_case::physical::Kind;
 use nanotap_case::under_law::LawName;
 use nanotap_case::{Case, Key};
@@ -27,6 +28,8 @@ const SAME_STIFFNESS: f64 = 1e-6;
 const DEEP: f64 = 1.0;
 /// A force below the baseline of more than this part of the largest is an adhesion that the law lacks.
 const ADHERES: f64 = 0.05;
+/// Rounds in which the weights of rows and the solution meet.
+const ROUNDS: usize = 3;
 /// Fewest rows in contact, and before it, that determine a modulus and a baseline.
 const MIN_ROWS: usize = 5;
 
@@ -65,6 +68,58 @@ pub(super) fn free_by_default(
         "free, because the option `free` names nothing: {}",
         all.join(", ")
     )
+}
+
+/// Fits again by forces at the same position of the tip, as most programs do, if the law is elastic and
+/// does not describe the curve: then the result depends on what is compared.
+///
+/// Rows whose residuals are noise are compared by deflections at the same distance, of which each has the
+/// same error. The two differ by the factor 1 + S/k, with the stiffness S of the contact, which the
+/// solution before gives.
+pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitReport {
+    let law = search.problem.case.stated(Key::SampleLaw);
+    let is_elastic = law.is_some_and(|law| selection::is_elastic(&law.text()));
+    if !is_elastic || !report.fits || !report.misfit {
+        return report;
+    }
+    let mut x: Vec<f64> = report.parameters.iter().map(|p| p.value).collect();
+    let mut data = search.problem.data.clone();
+    for round in 1..=ROUNDS {
+        for (index, curve) in data.curves.iter_mut().enumerate() {
+            let factors = search.problem.stiffness_factors(&x, index);
+            let known = &search.problem.data.curves[index].rows;
+            for ((row, known), factor) in curve.rows.iter_mut().zip(known).zip(factors) {
+                row.relative[0] = known.relative[0] / factor;
+                row.errors[0] = known.errors[0].map(|error| error / factor);
+            }
+        }
+        let weighted = Search {
+            problem: Problem {
+                data: &data,
+                ..search.weighted(Vec::new(), None)
+            },
+            ..*search
+        };
+        let Some(found) = weighted.fine(x) else {
+            break;
+        };
+        x = found.solution.x.clone();
+        if round == ROUNDS && !search.control.is_cancelled() {
+            let mut again = weighted.report(found, report.starts);
+            again.preparation.push(
+                "the law does not describe the curve to its noise: forces at the same position of the \
+                 tip are compared, not deflections at the same distance"
+                    .to_owned(),
+            );
+            return FitReport {
+                // How large the residuals are is said in terms of the noise.
+                remarks: report.remarks,
+                misfit: true,
+                ..again
+            };
+        }
+    }
+    report
 }
 
 /// What the fit of each force curve says; nothing for other data.

@@ -20,7 +20,7 @@ const VALUES: [(Key, &str); 9] = [
     (Key::LeverF0, "cantilever.f0=10 kHz"),
     (Key::LeverQ, "cantilever.Q=100"),
     (Key::DriveFrequency, "drive.frequency_ratio=1"),
-    (Key::DriveFreeAmplitude, "drive.free_amplitude=0 nm"),
+    (Key::DriveAmplitude, "drive.free_amplitude=0 nm"),
     (Key::GapTip, "gap.tip=0 nm"),
     (Key::SampleModulus, "sample.modulus=1 MPa"),
     (
@@ -138,6 +138,11 @@ pub fn implied_words(
                     .to_owned(),
             );
         }
+    }
+    // The laws have a default for hard samples.
+    if !has_case && !begins(&["sample.poisson=", "poisson=", "sample.material="]) {
+        let poisson = word_of(Key::SamplePoisson, request, &mut implied.notes)?;
+        implied.words.extend(poisson);
     }
     let mut last = error;
     while implied.words.len() < MAX_WORDS {

@@ -256,6 +256,9 @@ fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
                 let by_distance = swept.is_some_and(|swept| data::is_distance(swept.key));
                 let is_rest = search.problem.data.is_force_curve();
                 let mut report = search.run()?;
+                if is_rest {
+                    report = force_curve::compared_by_force(search, report);
+                }
                 let contacts = Contact::of(search, &report);
                 report.force_curves = force_curve::summaries(search, &report, &contacts, channels);
                 Ok((report, knows_way || !by_distance || is_rest, contacts))

@@ -53,15 +53,17 @@ impl Segment {
     }
 }
 
+/// Whether a law, by its name, has neither adhesion nor losses.
+pub(super) fn is_elastic(law: &str) -> bool {
+    SampleLaw::terms(law).is_ok_and(|terms| {
+        let mut entries = terms.iter().map(|term| term.entry);
+        entries.all(|entry| !entry.attracts && entry.conservative)
+    })
+}
+
 /// The segment of a force curve that is fitted where the request does not state one: the approach of an
 /// elastic law, both where a law has adhesion or losses.
 pub(super) fn default_segment(case: &Case, request: &FitOptions) -> Segment {
-    let is_elastic = |law: &str| {
-        SampleLaw::terms(law).is_ok_and(|terms| {
-            let mut entries = terms.iter().map(|term| term.entry);
-            entries.all(|entry| !entry.attracts && entry.conservative)
-        })
-    };
     let own = case.stated(Key::SampleLaw).map(|law| law.text());
     let mut laws = names(&request.laws);
     if laws.is_empty() {

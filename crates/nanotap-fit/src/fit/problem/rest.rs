@@ -31,6 +31,8 @@ pub(in crate::fit) const MAX_RINGING: usize = 6;
 /// Highest overshoot, in heights of the jump, and how the ringing decays from row to row.
 const HIGHEST: f64 = 1.2;
 const DECAY: f64 = 0.6;
+/// Step of a distance for the slope of a deflection, m.
+const SLOPE_STEP: f64 = 1e-10;
 /// Change of a key for its central difference, relative.
 const STEP: f64 = 1e-5;
 
@@ -99,6 +101,22 @@ impl Problem<'_> {
             lever: RestLever::of(&case).ok()?,
             rows: span(self.distances(x, curve).into_iter()),
         })
+    }
+
+    /// How much more a difference of forces at the same position of the tip is, in deflections, than one of
+    /// deflections at the same distance: 1 + S/k with the stiffness S of the contact, for each row of a
+    /// curve; 1 where the lever does not rest.
+    pub(in crate::fit) fn stiffness_factors(&self, x: &[f64], curve: usize) -> Vec<f64> {
+        let rested = self.rested(x, curve).map(Rested::with_chains);
+        let factor = |at: f64| {
+            let (lever, chains) = rested.as_ref()?;
+            let rest = |at: f64| chains.iter().find_map(|chain| lever.at(chain, at));
+            let [low, high] = [at - SLOPE_STEP, at + SLOPE_STEP].map(rest);
+            let slope = (high?.deflection - low?.deflection) / (2.0 * SLOPE_STEP);
+            Some(1.0 / (1.0 + slope)).filter(|factor| factor.is_finite() && *factor > 0.0)
+        };
+        let distances = self.distances(x, curve).into_iter();
+        distances.map(|at| factor(at).unwrap_or(1.0)).collect()
     }
 
     /// A size of a key that is 0.

@@ -231,15 +231,15 @@ fn series_table(model: &Model, rows: Vec<Vec<f64>>, units: Units) -> Frame<'stat
     table.frame()
 }
 
-/// A run: its document and its report, and `series_periods` of its time series or, for fixed steps,
-/// its curve.
+/// A run: its document, its values as columns of one row, its report, and `series_periods` of its
+/// time series or, for fixed steps, its curve.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
     py: Python<'py>,
     case: &CaseCore,
     request: &str,
     series_periods: usize,
-) -> PyResult<(Bound<'py, PyAny>, ReportCore, Table<'py>)> {
+) -> PyResult<(Bound<'py, PyAny>, Vec<Column>, ReportCore, Table<'py>)> {
     let case = case.studied(py)?;
     let request: SimulateOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched_alone(py, None, move |control| {
@@ -266,8 +266,9 @@ pub(crate) fn simulate<'py>(
         Ok((document, answer, names, values))
     })?;
     let (report, answer, names, values) = done.result;
-    let series = table(py, names, values)?;
-    Ok((python(py, &report)?, ReportCore::new(answer), series))
+    let (series, document) = (table(py, names, values)?, python(py, &report)?);
+    let columns = columns(py, &[Some(entries(report))])?;
+    Ok((document, columns, ReportCore::new(answer), series))
 }
 
 /// A periodic orbit: its document and its report.

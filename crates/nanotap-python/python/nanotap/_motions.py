@@ -77,9 +77,9 @@ def simulate(
         else _arguments.count("series", series)
     )
     _refuse_rows(shown, _arguments.count("resolution", options["resolution"]))
-    document, core, (names, values) = _nanotap.simulate(case._core, request, shown)
+    document, columns, core, curve = _nanotap.simulate(case._core, request, shown)
     made = _fixed_step if options["method"] == "rk4" else _run_dataset
-    return made(case, document, names, values).answered_by(Answer(core))
+    return made(case, document, columns, *curve).answered_by(Answer(core))
 
 
 @stoppable()
@@ -192,81 +192,55 @@ def _recorded(
 
 
 def _run_dataset(
-    case: Case, document: dict[str, Any], names: list[str], values: Floats
+    case: Case,
+    document: dict[str, Any],
+    columns: list[tuple[str, str, Any]],
+    names: list[str],
+    values: Floats,
 ) -> "StudyDataset":
     series, times = _columns(names, values)
-    entries = case.state_names
-    recorded, coords = _recorded(document, entries)
-    variables, attributes = _variables(document, entries)
-    attributes = case_attributes(case, "one run") | attributes
+    recorded, coords = _recorded(document, case.state_names)
+    attributes = case_attributes(case, "one run")
+    attributes["evidence"] = document["evidence"]
+    attributes["notes"] = "\n".join(document.get("notes", ()))
+    variables = _variables(columns)
+    if "energy_balance" in variables:
+        coords["energy"] = words(list(document["energy_balance"]))
     found = dataset(series | variables | recorded, times | coords, attributes)
     return answered(case, found)
 
 
-def _variables(
-    document: Mapping[str, Any], entries: list[str]
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The entries of a document as variables, and its text entries."""
-    variables: dict[str, Any] = {}
-    attributes: dict[str, Any] = {}
-    for name, value in document.items():
-        if name == "evidence":
-            attributes[name] = value
-        elif name == "notes":
-            attributes[name] = "\n".join(value)
-        elif name == "energy_balance":
-            names = list(value)
-            index = ("energy", words(names))
-            variables[name] = (
-                "energy",
-                np.array([value[key] for key in names], dtype=float),
-            )
-            variables["energy"] = index
-        elif isinstance(value, Mapping):
-            inner, _ = _variables(value, entries)
-            # Entries with their own shape are available for single results only.
-            flat = {key: entry for key, entry in inner.items() if entry[0] == ()}
-            variables |= {f"{name}_{key}": entry for key, entry in flat.items()}
-        elif isinstance(value, list):
-            variable = _vector(name, value, entries)
-            if variable is not None:
-                # `state` is the dimension of the entries of a state.
-                variables["orbit_state" if name == "state" else name] = variable
-        elif isinstance(value, bool | str):
-            variables[name] = ((), value)
-        else:
-            variables[name] = ((), np.nan if value is None else value)
-    return variables, attributes
-
-
-def _vector(name: str, value: list[Any], entries: list[str]) -> Any:
-    if not all(isinstance(entry, int | float) for entry in value):
-        return None
-    if name.endswith("_range"):
-        return ("bound", np.array(value, dtype=float))
-    if len(value) == len(entries):
-        dimension = "exponent" if name.startswith("lyapunov") else "state"
-        return (dimension, np.array(value, dtype=float))
-    return None
+def _variables(columns: list[tuple[str, str, Any]]) -> dict[str, Any]:
+    """The only row of columns as variables; strobe points have coordinates of their own."""
+    return {
+        name: ((along,) if along else (), values[0])
+        for name, along, values in columns
+        if name not in {"strobe", "evidence"}
+    }
 
 
 def _fixed_step(
-    case: Case, parsed: dict[str, Any], names: list[str], values: Floats
+    case: Case,
+    document: dict[str, Any],
+    columns: list[tuple[str, str, Any]],
+    names: list[str],
+    values: Floats,
 ) -> "StudyDataset":
-
-    exact = parsed.pop("exact")
-    steps = parsed.pop("steps")
-    entries = case.state_names
-    recorded, coords = _recorded(parsed, entries)
-    variables, attributes = _variables(parsed, entries)
+    exact = document["exact"]
+    recorded, coords = _recorded(document, case.state_names)
     series = {name: ("tau", values[:, k]) for k, name in enumerate(names) if k}
     attributes = {
         **case_attributes(case, "one run with time steps"),
-        **attributes,
-        "steps": steps,
+        "notes": "\n".join(document.get("notes", ())),
+        "steps": document["steps"],
         "exact_classification": exact["classification"],
         "exact_period": exact["period"] or 0,
         "exact_evidence": exact["evidence"],
+    }
+    variables = {
+        name: value
+        for name, value in _variables(columns).items()
+        if not name.startswith(("exact_", "steps"))
     }
     times = {"tau": values[:, 0]}
     found = dataset(series | variables | recorded, coords | times, attributes)

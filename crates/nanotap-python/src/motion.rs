@@ -128,7 +128,7 @@ fn rows(
 #[serde(untagged)]
 enum MotionReport {
     Run(SimulateReport),
-    Orbit(InSi<OrbitReport>),
+    Orbit(Box<InSi<OrbitReport>>),
 }
 
 /// A motion of a case, with its time series of so many samples a period as the first table.
@@ -284,7 +284,7 @@ pub(crate) fn orbit<'py>(
     let searched = request.period.is_some() && request.state.is_none();
     let work = move |control: &Control<'_>| {
         let found = OrbitStudy::run(&case, &request, control)?;
-        let (document, report) = (document(&found)?, MotionReport::Orbit(found));
+        let (document, report) = (document(&found)?, MotionReport::Orbit(Box::new(found)));
         let resolution = request.resolution;
         Ok((
             document,

@@ -53,7 +53,10 @@ impl ReportCore {
     /// The document, JSON.
     #[getter]
     fn document(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |answer| answer.document())
+        self.with(py, |answer| {
+            let document = answer.document()?;
+            Ok(document)
+        })
     }
 
     /// The tables column by column, JSON.

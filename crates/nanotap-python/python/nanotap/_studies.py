@@ -154,7 +154,8 @@ def _branch_dataset(
         parameter_symbol=symbols.get(name, name),
         **_shown(units, "branch", report, ("branches", "failures")),
     )
-    ds[name].attrs["long_name"] = _nanotap.label(name, symbols.get(name, name))
+    title = _nanotap.label(name, symbols.get(name, name)).split(" $")[0]
+    ds[name].attrs.update(long_name=title, units="1")
     unit = report.get("parameter_unit")
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)

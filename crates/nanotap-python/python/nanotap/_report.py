@@ -56,6 +56,12 @@ class Answer:
         return _restored, ({name: getattr(self, name) for name in names},)
 
 
+def answer_of(result: object) -> Answer | None:
+    """The tables and the figure of a result that is as its study returned it."""
+    answer: Answer | None = getattr(result, "_answer", None)
+    return answer
+
+
 def _restored(known: dict[str, Any]) -> Answer:
     return Answer(None, **known)
 

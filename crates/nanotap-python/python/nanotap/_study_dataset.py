@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self
 import xarray as xr
 from xarray.plot.accessor import DatasetPlotAccessor
 
-from ._report import Answer, chosen, frame
+from ._report import Answer, answer_of, chosen, frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,9 +77,3 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         if isinstance(dim_order, str) and answer is not None:
             return frame(chosen(answer.tables, dim_order))
         return super().to_dataframe(dim_order)
-
-
-def answer_of(result: object) -> Answer | None:
-    """The tables and the figure of a result that has them."""
-    answer: Answer | None = getattr(result, "_answer", None)
-    return answer

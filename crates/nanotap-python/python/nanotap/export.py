@@ -16,7 +16,7 @@ import pandas as pd
 
 from . import _arguments, _nanotap
 from ._case import Path
-from ._report import Answered
+from ._report import Answered, answer_of
 from ._results import Attractors, Convergence, Modes, Orbit, Paper
 
 if TYPE_CHECKING:
@@ -94,8 +94,8 @@ def csv(result: Any, path: Path) -> None:
 
 def _terminal_file(result: Any) -> str | None:
     """The text of the terminal's file, if the result has one."""
-    if (answer := getattr(result, "_answer", None)) is not None:
-        return str(answer.csv)
+    if (answer := answer_of(result)) is not None:
+        return answer.csv
     if "kind" not in getattr(result, "attrs", ()):
         return None
     named = ("classification", "attractor", "result")

@@ -15,7 +15,7 @@ import numpy as np
 from . import _nanotap
 from ._describe import name_in_si
 from ._figure import STYLE, Picture, draw, page
-from ._report import Answered
+from ._report import Answered, answer_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,8 +89,8 @@ def _drawn(
 
 def _whole(ds: "xr.Dataset") -> str | None:
     """The figure of a result that is as its study returned it."""
-    answer = getattr(ds, "_answer", None)
-    return None if answer is None else str(answer.figure)
+    answer = answer_of(ds)
+    return None if answer is None else answer.figure
 
 
 def _points(x: Any, y: Any) -> list[list[float]]:

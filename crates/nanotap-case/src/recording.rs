@@ -80,7 +80,14 @@ pub(super) fn parse(
     if let (None, Some(kind)) = (recognise(&bytes), kind(name)) {
         return Err(RecordingError::Other(kind));
     }
-    let document = afm_files::read(bytes)?;
+    of_document(&afm_files::read(bytes)?, number)
+}
+
+/// A curve of a file that is open, by its number from 0; without one the first.
+pub(super) fn of_document(
+    document: &Document,
+    number: Option<usize>,
+) -> Result<Recording, RecordingError> {
     let count = document.curve_count();
     if count == 0 {
         return Err(RecordingError::NoCurve {
@@ -100,7 +107,7 @@ pub(super) fn parse(
     if recording.columns.iter().all(|(_, of)| of.is_empty()) {
         return Err(RecordingError::NoRows);
     }
-    recording.notes = notes(&document, &curve);
+    recording.notes = notes(document, &curve);
     recording.remarks.extend(curve.notes);
     if count > 1 {
         let which = number.map_or_else(

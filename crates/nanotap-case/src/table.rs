@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 use super::quantity::Quantity;
 use super::recording::{self, Recording};
 use crate::input::{self, MAX_TABLE_BYTES, Origin};
+use afm_files::Document;
 use nanotap_error::Error;
 
 /// Most rows of a table.
@@ -100,6 +101,20 @@ impl Table {
             )
         })?;
         Self::parse(&name, &text)
+    }
+
+    /// The curve of this number, from 0, of an instrument's file that is open under this name.
+    ///
+    /// # Errors
+    /// If there is no such curve, it is damaged, or it has no complete row.
+    pub fn of_document(name: &str, document: &Document, number: usize) -> Result<Self, Error> {
+        let mut recorded = recording::of_document(document, Some(number)).map_err(|error| {
+            let message = format!("{name}, curve {number}: {error}");
+            Error::input(message, "`nanotap files` lists what a file holds")
+        })?;
+        // That others are read, too, is known.
+        recorded.remarks.pop();
+        Ok(Self::of_recording(name, recorded))
     }
 
     /// The table of an instrument's file.

@@ -1,16 +1,18 @@
 //! `nanotap fit`: parameters of lever and sample from measured curves.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use nanotap::case::Key;
 use nanotap::case::physical::Kind;
 use nanotap::dataset::Share;
 use nanotap::figure::fit::{FitMaps, fit_figure};
+use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{
     Estimate, FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve,
-    FittedParameter,
+    FittedParameter, MapFile, Table as MeasuredTable,
 };
 use serde::Serialize;
 
@@ -50,12 +52,13 @@ pub(crate) struct Arguments {
     threads: ThreadsArgument,
 
     /// Write the case of the best fit (.toml), with --per-curve one per curve
-    /// (NAME-CURVE.toml), or the rows with model and residuals (.csv); with --pixels the dataset
-    /// (.zarr), of which an unfinished one is continued
+    /// (NAME-CURVE.toml), or the rows with model and residuals (.csv); of a map, an instrument's or
+    /// one with --pixels, the dataset of the fits of all its curves (.zarr), of which an unfinished
+    /// one is continued
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
 
-    /// With --pixels, fit only one of n shares of the pixels, as in 2/8; `nanotap merge` merges them
+    /// Of a map, fit only one of n shares of the pixels, as in 2/8; `nanotap merge` merges them
     #[arg(long, value_name = "I/N", default_value_t = Share::WHOLE, hide_default_value = true)]
     chunk: Share,
 
@@ -74,13 +77,15 @@ struct Written<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let mut request = arguments.request.read()?;
-    if !request.pixels.is_empty() {
+    let is_zarr = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "zarr");
+    let leaves_dataset = arguments.out.as_ref().is_some_and(is_zarr);
+    if !request.pixels.is_empty() || leaves_dataset && arguments.curve.is_none() {
         return map(arguments, &mut request, output);
     }
     if !arguments.chunk.is_whole() {
         return Err(Failure::input(
             "--chunk fits a share of the pixels of a map",
-            "give --pixels and --out NAME.zarr, too",
+            "give --out NAME.zarr, too, and of a table --pixels",
         ));
     }
     let ending = match &arguments.out {
@@ -138,8 +143,19 @@ fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Resu
         ));
     };
     file::ending(path, &["zarr", "csv"])?;
-    request.data = measured(&arguments.data, &arguments.also, arguments.curve, "fit")?;
-    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    if request.pixels.is_empty() {
+        let document = files::open(&arguments.data)?;
+        let name = arguments.data.display().to_string();
+        request.data = vec![MeasuredTable::of_document(&name, &document, 0)?];
+        request.map = MapFile(Some(Arc::new(document)));
+    } else {
+        request.data = measured(&arguments.data, &arguments.also, arguments.curve, "fit")?;
+    }
+    let (case, assumed) = GivenCase::of_data(&arguments.case, request)?;
+    case.note_replaced(output);
+    for note in assumed {
+        output.note(&note);
+    }
     let dataset = DatasetArguments {
         out: Some(path.clone()),
         chunk: arguments.chunk,

@@ -5,7 +5,7 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
-use crate::fit::{FitReport, FittedColumn, FittedRow, Reading};
+use crate::fit::{FitReport, FittedColumn, FittedRow, OF_FORCES, Reading};
 use nanotap_case::Key;
 use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
@@ -92,16 +92,19 @@ impl FitMaps {
         });
         let mut maps = Vec::new();
         for (k, variable) in schema.variables.iter().enumerate() {
-            if schema
+            let is_parameter = schema
                 .index_of(&format!("{}_error", variable.name))
-                .is_none()
-            {
+                .is_some();
+            if !is_parameter && !OF_FORCES.iter().any(|(name, ..)| *name == variable.name) {
                 continue;
             }
             let mut values = Vec::new();
             for chunk in 0..store.chunks() {
                 let numbers = store.read_chunk(&schema.grid.block(chunk), k)?.numbers();
                 values.extend(numbers.into_iter().map(Some));
+            }
+            if values.iter().flatten().all(|value: &f64| value.is_nan()) {
+                continue;
             }
             maps.push(MappedColumn {
                 name: variable.name.clone(),

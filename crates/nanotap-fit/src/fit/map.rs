@@ -1,11 +1,14 @@
 //! Fits of a map of curves: a force volume, one fit a pixel, into a dataset.
 //!
-//! The rows of the data name their pixel in further columns. Pixels of a chunk are fitted in
+//! The rows of the data name their pixel in further columns, or the map is an instrument's file, whose
+//! curves are read when they are fitted. Pixels of a chunk are fitted in
 //! sequence, each from the result of the one before; where that does not describe the data, from every
 //! initial value again, as a single curve. The result does not depend on threads.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use afm_files::Document;
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -158,6 +161,168 @@ fn error_of(key: &str) -> String {
     format!("{key}_error")
 }
 
+/// What a map of force curves has beside the parameters, with its unit in SI.
+pub(crate) const OF_FORCES: [(&str, &str, &str); 3] = [
+    (
+        "contact_point",
+        "distance at which the undeflected tip meets the surface",
+        "m",
+    ),
+    (
+        "adhesion_force",
+        "adhesion: minus the lowest force of the model",
+        "N",
+    ),
+    ("residual_force", "root mean square of the residuals", "N"),
+];
+
+/// A map in an instrument's file, whose curves are read one by one.
+#[derive(Clone, Debug, Default)]
+pub struct MapFile(pub Option<Arc<Document>>);
+
+impl PartialEq for MapFile {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+/// Where the curve of each pixel comes from. Pixels are numbered as the entries of the grid.
+#[derive(Debug)]
+enum Source {
+    /// The rows of a table that name the pixel.
+    Rows {
+        table: Table,
+        rows: BTreeMap<usize, Vec<usize>>,
+    },
+    /// The numbers of the curves of a file.
+    File {
+        document: Arc<Document>,
+        name: String,
+        curves: BTreeMap<usize, usize>,
+    },
+}
+
+impl Source {
+    /// The pixels of a table by these columns, of which the last changes slowest.
+    fn of_table(mut table: Table, pixels: &[String]) -> Result<(Self, Vec<Pixels>), Error> {
+        let axes = pixels.iter().rev().map(|name| taken(&mut table, name));
+        let (axes, columns): (Vec<Pixels>, Vec<Vec<usize>>) =
+            axes.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
+        let mut rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for row in 0..table.rows() {
+            let entry = axes.iter().zip(&columns);
+            let entry = entry.fold(0, |flat, (axis, at)| flat * axis.values.len() + at[row]);
+            rows.entry(entry).or_default().push(row);
+        }
+        Ok((Self::Rows { table, rows }, axes))
+    }
+
+    /// The pixels of a file by its grid, or by the numbers of its curves.
+    fn of_file(document: &Arc<Document>, name: String) -> (Self, Vec<Pixels>) {
+        let (curves, axes) = match document.grid {
+            Some(grid) => {
+                let [columns, lines] = grid.shape;
+                let axis = |name: &str, k: usize| Pixels {
+                    name: name.to_owned(),
+                    unit: "m".to_owned(),
+                    values: (0..grid.shape[k])
+                        .map(|at| (at as f64 + 0.5) * grid.size[k] / grid.shape[k] as f64)
+                        .collect(),
+                };
+                let cells = (0..lines).flat_map(|line| (0..columns).map(move |at| [at, line]));
+                let numbered = cells.enumerate();
+                let curves =
+                    numbered.filter_map(|(entry, cell)| Some((entry, document.number_at(cell)?)));
+                (curves.collect(), vec![axis("y", 1), axis("x", 0)])
+            }
+            None => {
+                let all = 0..document.curve_count();
+                let axis = Pixels {
+                    name: "curve".to_owned(),
+                    unit: "1".to_owned(),
+                    values: all.clone().map(|number| number as f64).collect(),
+                };
+                (all.map(|number| (number, number)).collect(), vec![axis])
+            }
+        };
+        let document = Arc::clone(document);
+        let source = Self::File {
+            document,
+            name,
+            curves,
+        };
+        (source, axes)
+    }
+
+    /// The first pixels with a curve; of a file, pixels all over it.
+    fn first_entries(&self) -> Vec<usize> {
+        match self {
+            Self::Rows { rows, .. } => rows.keys().copied().take(FIRST).collect(),
+            Self::File { curves, .. } => {
+                let step = curves.len().div_ceil(FIRST).max(1);
+                curves.keys().copied().step_by(step).collect()
+            }
+        }
+    }
+
+    /// Whether a pixel has a curve.
+    fn has(&self, entry: usize) -> bool {
+        match self {
+            Self::Rows { rows, .. } => rows.contains_key(&entry),
+            Self::File { curves, .. } => curves.contains_key(&entry),
+        }
+    }
+
+    /// The curve of a pixel.
+    fn curve(&self, entry: usize) -> Result<Table, Error> {
+        let none = || Error::option("data", format!("pixel {entry} has no curve"), "give one");
+        match self {
+            Self::Rows { table, rows } => {
+                let rows = rows.get(&entry).ok_or_else(none)?;
+                let columns = table.columns.iter().map(|(header, column)| {
+                    let own = rows.iter().filter_map(|row| column.get(*row).cloned());
+                    (header.clone(), own.collect())
+                });
+                let lines = rows.iter().filter_map(|row| table.lines.get(*row));
+                Ok(Table {
+                    name: table.name.clone(),
+                    columns: columns.collect(),
+                    lines: lines.copied().collect(),
+                    notes: table.notes.clone(),
+                    remarks: Vec::new(),
+                })
+            }
+            Self::File {
+                document,
+                name,
+                curves,
+            } => {
+                let number = *curves.get(&entry).ok_or_else(none)?;
+                Table::of_document(name, document, number)
+            }
+        }
+    }
+
+    /// What distinguishes the data from others when a dataset is continued.
+    fn fingerprint(&self) -> serde_json::Value {
+        match self {
+            Self::Rows { table, .. } => attributes::text(&fingerprint(table)),
+            Self::File { curves, .. } => {
+                let first = curves
+                    .keys()
+                    .next()
+                    .and_then(|entry| self.curve(*entry).ok());
+                let first = first.map(|table| fingerprint(&table));
+                attributes::text(&(curves.len(), first))
+            }
+        }
+    }
+}
+
 /// An axis of pixels: the numbers in a column of the data.
 #[derive(Debug)]
 struct Pixels {
@@ -172,19 +337,19 @@ struct Map {
     case: Case,
     /// Options of the fit of one pixel; data and pixels are empty.
     options: FitOptions,
-    table: Table,
-    /// Rows of the table of each pixel, by the number of its entry in the grid.
-    rows: BTreeMap<usize, Vec<usize>>,
+    source: Source,
     parameters: Vec<String>,
     /// Whether the rows of the first pixel are in the other order.
     turned: bool,
+    /// Whether the curves are force curves, with a contact point and an adhesion.
+    has_forces: bool,
     schema: Schema,
 }
 
 impl Map {
     fn new(case: &Case, options: &FitOptions, control: &Control<'_>) -> Result<Self, Error> {
         let pixels = names(&options.pixels);
-        if !(1..=2).contains(&pixels.len()) {
+        if options.map.0.is_none() && !(1..=2).contains(&pixels.len()) {
             return Err(Error::option(
                 "pixels",
                 format!("expected one or two columns, got {}", pixels.len()),
@@ -205,11 +370,10 @@ impl Map {
                 "put all pixels into one table",
             ));
         };
-        let mut table = table.clone();
-        // The last column named changes slowest.
-        let axes = pixels.iter().rev().map(|name| taken(&mut table, name));
-        let (axes, columns): (Vec<Pixels>, Vec<Vec<usize>>) =
-            axes.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
+        let (source, axes) = match &options.map.0 {
+            Some(file) => Source::of_file(file, table.name.clone()),
+            None => Source::of_table(table.clone(), &pixels)?,
+        };
         let count: usize = axes.iter().map(|axis| axis.values.len()).product();
         if count > MAX_PIXELS {
             return Err(Error::option(
@@ -218,24 +382,19 @@ impl Map {
                 "fit a part of the map",
             ));
         }
-        let mut rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for row in 0..table.rows() {
-            let entry = axes.iter().zip(&columns);
-            let entry = entry.fold(0, |flat, (axis, at)| flat * axis.values.len() + at[row]);
-            rows.entry(entry).or_default().push(row);
-        }
         let options = FitOptions {
             data: Vec::new(),
             pixels: Vec::new(),
+            map: MapFile::default(),
             profile: false,
             ..options.clone()
         };
         let mut map = Self {
             case: case.clone(),
             options,
-            table,
-            rows,
+            source,
             parameters: Vec::new(),
+            has_forces: false,
             turned: false,
             schema: Schema {
                 grid: Grid { axes: Vec::new() },
@@ -247,6 +406,7 @@ impl Map {
         let first = map.first(control)?;
         map.turned = first.turned;
         map.parameters = first.parameters.iter().map(|p| p.key.clone()).collect();
+        map.has_forces = !first.force_curves.is_empty();
         map.describe(&first, axes);
         Ok(map)
     }
@@ -258,8 +418,8 @@ impl Map {
             ..*control
         };
         let mut refused = None;
-        for rows in self.rows.values().take(FIRST) {
-            match self.fitted(rows, None, &quiet) {
+        for entry in self.source.first_entries() {
+            match self.fitted(entry, None, &quiet) {
                 Ok(report) => return Ok(report),
                 Err(error) if control.is_cancelled() => return Err(error),
                 Err(error) => refused = refused.or(Some(error)),
@@ -271,22 +431,11 @@ impl Map {
     /// The fit of a pixel, from the result of another if one is given.
     fn fitted(
         &self,
-        rows: &[usize],
+        entry: usize,
         before: Option<&FitReport>,
         control: &Control<'_>,
     ) -> Result<FitReport, Error> {
-        let columns = self.table.columns.iter().map(|(header, column)| {
-            let own = rows.iter().filter_map(|row| column.get(*row).cloned());
-            (header.clone(), own.collect())
-        });
-        let lines = rows.iter().filter_map(|row| self.table.lines.get(*row));
-        let table = Table {
-            name: self.table.name.clone(),
-            columns: columns.collect(),
-            lines: lines.copied().collect(),
-            notes: self.table.notes.clone(),
-            remarks: Vec::new(),
-        };
+        let table = self.source.curve(entry)?;
         let turned = before.map_or(self.turned, |before| before.turned);
         let mut options = FitOptions {
             data: vec![if turned { table.reversed() } else { table }],
@@ -325,6 +474,11 @@ impl Map {
                 unit,
             ));
         }
+        if self.has_forces {
+            for (name, about, unit) in OF_FORCES {
+                variables.push(real(name, about, unit));
+            }
+        }
         variables.push(real(
             "chi2_reduced",
             "chi2 over the degrees of freedom",
@@ -338,7 +492,7 @@ impl Map {
         );
         let attributes = &mut self.schema.attributes;
         attributes.insert("options".into(), attributes::text(&self.options));
-        attributes.insert("data".into(), attributes::text(&fingerprint(&self.table)));
+        attributes.insert("data".into(), self.source.fingerprint());
         let last = axes.len() - 1;
         for (k, axis) in axes.into_iter().enumerate() {
             let length = axis.values.len();
@@ -364,7 +518,8 @@ impl Map {
             progress: None,
             ..*control
         };
-        let count = 2 * self.parameters.len() + 2;
+        let forces = if self.has_forces { OF_FORCES.len() } else { 0 };
+        let count = 2 * self.parameters.len() + forces + 2;
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); count];
         let mut before: Option<FitReport> = None;
         let axes = &self.schema.grid.axes;
@@ -373,13 +528,13 @@ impl Map {
             let entry = entry.fold(0, |flat, (at, axis)| flat * axis.length + at);
             let mut values = vec![f64::NAN; count];
             values[count - 1] = 0.0;
-            if let Some(rows) = self.rows.get(&entry) {
+            if self.source.has(entry) {
                 let near = before
                     .as_ref()
-                    .map(|near| self.fitted(rows, Some(near), &quiet));
+                    .map(|near| self.fitted(entry, Some(near), &quiet));
                 let report = match near {
                     Some(Ok(report)) if report.fits && !report.misfit => Ok(report),
-                    _ => self.fitted(rows, None, &quiet),
+                    _ => self.fitted(entry, None, &quiet),
                 };
                 if quiet.is_cancelled() {
                     return None;
@@ -391,6 +546,13 @@ impl Map {
                         values[2 * k] = parameter.map_or(f64::NAN, |p| p.value);
                         let error = parameter.and_then(|p| p.standard_error);
                         values[2 * k + 1] = error.unwrap_or(f64::NAN);
+                    }
+                    if let (true, Some(curve)) = (self.has_forces, report.force_curves.first()) {
+                        let contact = curve.contact_point.map_or(f64::NAN, |point| point.value);
+                        let adhesion = curve.adhesion_force.map_or(f64::NAN, |force| -force);
+                        values[count - 5] = contact;
+                        values[count - 4] = adhesion;
+                        values[count - 3] = curve.residual_force;
                     }
                     values[count - 2] = report.chi2 / report.degrees_of_freedom.max(1) as f64;
                     let fits = report.fits && !report.misfit;

@@ -51,7 +51,8 @@ use crate::figure::fit::fit_figure;
 pub(crate) use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use implied_case::{ImpliedWords, implied_words};
-pub use map::{FitMap, FitMapReport, MappedParameter};
+pub(crate) use map::OF_FORCES;
+pub use map::{FitMap, FitMapReport, MapFile, MappedParameter};
 pub use nanotap_case::table::{Entry, MAX_ROWS, Table};
 use nanotap_figures::Figure;
 use nanotap_observe::frame::Frame;
@@ -116,6 +117,9 @@ options! {
         /// Columns that name the pixel of a force volume, as in x,y: one fit a pixel, into a dataset
         #[schemars(extend("x-value" = "NAME,…"))]
         pub pixels: Vec<String> = Vec::new(),
+        /// A map in an instrument's file, of which `data` has a curve
+        #[serde(skip)]
+        pub map: MapFile = MapFile::default(),
         /// Segment of a curve to fit; default for a force curve: its approach under an elastic law, both
         /// under one with adhesion or losses
         pub segment: Option<Segment> = None,

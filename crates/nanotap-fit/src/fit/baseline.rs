@@ -183,7 +183,7 @@ impl Search<'_> {
     fn values_of_curve(problem: &Problem<'_>, x: &[f64], curve: usize) -> Vec<[f64; 2]> {
         let rows = problem.data.curves[curve].rows.iter();
         let known = rows.filter_map(|row| {
-            let value = problem.unread(x, curve, 0, row.values[0]?);
+            let value = problem.unread(x, curve, row, 0, row.values[0]?);
             Some([problem.place(x, curve, row)[0], value])
         });
         known.collect()

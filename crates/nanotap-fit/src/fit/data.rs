@@ -22,6 +22,7 @@ use nanotap_motions::approach::Way;
 use nanotap_observe::OBSERVABLES;
 
 use super::quantity::Quantity;
+use super::terms::Ramp;
 use super::thin::Scatter;
 use nanotap_case::table::{Entry, Header, Table};
 
@@ -97,6 +98,8 @@ pub struct Row {
     pub line: u64,
     /// Whether it is far from the sample, where the scatter of the values is known.
     pub(crate) is_free: bool,
+    /// Where it is on the ramp of its curve.
+    pub(crate) ramp: Ramp,
 }
 
 impl Data {
@@ -356,6 +359,7 @@ impl Data {
             way: None,
             line: table.lines.get(index).copied().unwrap_or(index as u64 + 1),
             is_free: false,
+            ramp: Ramp::default(),
         };
         let mut curve = table.name.clone();
         for (column, role) in roles.iter().enumerate() {

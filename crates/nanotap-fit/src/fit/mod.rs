@@ -43,6 +43,7 @@ mod search;
 mod selection;
 mod solve;
 mod statistics;
+pub(crate) mod terms;
 pub(crate) mod thin;
 
 use nanotap_dynamics::Control;
@@ -342,8 +343,9 @@ fn with_search<R>(
     } else {
         at_setpoint(case.clone(), control)?.0
     };
-    let mut free = names(&request.free);
-    let mut per_curve = names(&request.per_curve);
+    data.measure_ramp();
+    let mut free = terms::expanded(names(&request.free), &data)?;
+    let mut per_curve = terms::expanded(names(&request.per_curve), &data)?;
     let starts = starts(&request.start)?;
     // A zero that was read from noisy rows is known no better than they are.
     let has_phase = data.columns.iter().any(|c| c.quantity.name() == "phase");
@@ -384,12 +386,14 @@ fn with_search<R>(
     }
     data.add_free_scatter();
     preparation.extend(data.average(request.rows));
+    data.measure_ramp();
     if data.is_force_curve() {
         preparation.extend(baseline::assumptions(&case, &data)?);
     }
     let mut parameters = parameters(&case, &data, &free, &per_curve, &request.bounds)?;
     begin(&case, &data, &mut parameters, &starts)?;
     preparation.extend(begin_from_free_rows(&case, &data, &mut parameters));
+    terms::begin_interference(&data, &mut parameters);
     keep_physical(&mut parameters, &request.bounds);
     let held = data
         .is_modulated()

@@ -2,7 +2,7 @@
 //!
 //! `X.offset` is added to the values of a column X: to the positions of its rows, or to the model's
 //! values of an observable. `X.scale` multiplies the model's values. `gap.offset` is the offset of
-//! the distance.
+//! the distance. `terms.rs` has the other corrections.
 
 use nanotap_case::{Case, Key};
 use nanotap_error::Error;
@@ -12,6 +12,7 @@ use super::data::{self, Data, is_distance};
 use super::laws::between;
 use super::quantity::Quantity;
 use super::statistics::span;
+use super::terms::{self, Term};
 
 /// Quantity that a free parameter changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub(super) enum Target {
     Offset(usize),
     /// Factor of an observable, by its column.
     Scale(usize),
+    /// Term of the instrument in the readings of a column, or in the distance.
+    Term(Term, usize),
 }
 
 /// A free parameter of a fit.
@@ -44,23 +47,14 @@ pub(super) struct Parameter {
     pub(super) is_given: bool,
     /// Whether its bounds are the limits of what is physical.
     pub(super) is_limited: bool,
+    /// Mean and standard deviation of its normal prior.
+    pub(super) prior: Option<[f64; 2]>,
 }
 
 impl Parameter {
     /// Returns the unit in SI, `1` if there is none.
-    pub(super) fn unit(&self, data: &Data, case: &Case) -> &'static str {
-        match self.target {
-            Target::Key(key) => unit_of(key),
-            Target::Place(at) => unit_of(data.swept[at].key),
-            Target::Scale(_) => "1",
-            Target::Offset(column) => {
-                let quantity = data.columns[column].quantity;
-                match quantity.kind() {
-                    Some(_) if !case.is_physical() => "1",
-                    _ => quantity.unit(true),
-                }
-            }
-        }
+    pub(super) fn unit(&self, data: &Data, case: &Case) -> String {
+        unit(self.target, data, case)
     }
 
     /// Returns whether this is the name of the parameter, or another name of its key.
@@ -78,17 +72,25 @@ impl Parameter {
         self.curve.is_none_or(|own| own == curve)
     }
 
-    /// Derivatives of a row's values by an offset or a scale of a column; zero for other
-    /// parameters.
-    pub(super) fn direct(&self, values: &[f64]) -> Vec<f64> {
-        let mut by = vec![0.0; values.len()];
-        match self.target {
-            Target::Offset(column) => by[column] = 1.0,
-            Target::Scale(column) => by[column] = values[column],
-            Target::Key(_) | Target::Place(_) => {}
+}
+
+/// Unit of a target in SI, `1` if there is none.
+fn unit(target: Target, data: &Data, case: &Case) -> String {
+    let of_column = |column: usize| {
+        let quantity = data.columns[column].quantity;
+        match quantity.kind() {
+            Some(_) if !case.is_physical() => "1",
+            _ => quantity.unit(true),
         }
-        by
-    }
+    };
+    let unit = match target {
+        Target::Key(key) => unit_of(key),
+        Target::Place(at) => unit_of(data.swept[at].key),
+        Target::Scale(_) => "1",
+        Target::Offset(column) => of_column(column),
+        Target::Term(term, column) => return term.unit(of_column(column), case.is_physical()),
+    };
+    unit.to_owned()
 }
 
 /// Unit of a key in SI, `1` if there is none.
@@ -175,7 +177,7 @@ fn parameter(
     bound: Option<&Interval>,
 ) -> Result<Parameter, Error> {
     if let Some((of, what)) = name.rsplit_once('.')
-        && matches!(what, "offset" | "scale")
+        && (matches!(what, "offset" | "scale") || Term::named(what).is_some())
     {
         return nuisance(case, data, name, of, what);
     }
@@ -223,10 +225,11 @@ fn parameter(
         size: start.abs(),
         is_given: false,
         is_limited: false,
+        prior: None,
     })
 }
 
-fn nuisance(
+pub(super) fn nuisance(
     case: &Case,
     data: &Data,
     name: &str,
@@ -246,6 +249,14 @@ fn nuisance(
             |swept: &data::SweptKey| swept.key == key || is_distance(swept.key) && is_distance(key);
         data.swept.iter().position(same)
     };
+    let term = Term::named(what);
+    let has_term = match term {
+        Some(term) if term.is_of_distance() => swept() == Some(0),
+        _ => column.is_some(),
+    };
+    if let Some(term) = term.filter(|_| has_term) {
+        return terms::parameter(case, data, name, (term, column.unwrap_or(0)));
+    }
     let (target, start, size, bounds) = match (column, what) {
         (Some(column), "offset") => (
             Target::Offset(column),
@@ -253,8 +264,8 @@ fn nuisance(
             0.1 * data.columns[column].spread,
             any,
         ),
-        (Some(column), _) => (Target::Scale(column), 1.0, 0.1, (1e-9, f64::INFINITY)),
-        (None, _) => match swept() {
+        (Some(column), "scale") => (Target::Scale(column), 1.0, 0.1, (1e-9, f64::INFINITY)),
+        _ => match swept() {
             Some(at) if what == "offset" => {
                 let rows = data.curves.iter().flat_map(|curve| &curve.rows);
                 let values = rows.map(|row| row.at[at]);
@@ -282,6 +293,7 @@ fn nuisance(
         size,
         is_given: false,
         is_limited: false,
+        prior: None,
     })
 }
 
@@ -294,8 +306,21 @@ fn read(case: &Case, data: &Data, target: Target, text: &str) -> Result<f64, Err
     };
     match target {
         Target::Key(key) => Ok(case.value(key, text)?),
-        Target::Place(at) => Ok(case.value(data.swept[at].key, text)?),
-        Target::Offset(column) => {
+        Target::Place(_) | Target::Term(Term::Period | Term::Drift | Term::Backlash, _) => {
+            Ok(case.value(data.swept[0].key, text)?)
+        }
+        Target::Term(Term::Tilt | Term::Curvature, _) => {
+            let unit = unit(target, data, case);
+            let text = text.trim();
+            let bare = text.strip_suffix(unit.as_str()).unwrap_or(text).trim();
+            bare.parse::<f64>().or_else(|_| number()).map_err(|_| {
+                Error::input(
+                    format!("expected a number in {unit}, got `{text}`"),
+                    "give it in SI",
+                )
+            })
+        }
+        Target::Offset(column) | Target::Term(_, column) => {
             let quantity = data.columns[column].quantity;
             match quantity.kind().filter(|_| case.is_physical()) {
                 Some(kind) => kind
@@ -439,9 +464,16 @@ pub(super) fn correct(
     is_free: impl Fn(&str) -> bool,
 ) -> Result<Vec<String>, Error> {
     let mut notes = Vec::new();
-    for (name, text) in starts.iter().filter(|(name, _)| !is_free(name)) {
+    let mut fixed = Vec::new();
+    let is_scale = |name: &str| name.ends_with(".scale");
+    let given = || starts.iter().filter(|(name, _)| !is_free(name));
+    // A reading is the scaled value with its offset and terms: these are taken off first.
+    let first = given().filter(|(name, _)| !is_scale(name));
+    for (name, text) in first.chain(given().filter(|(name, _)| is_scale(name))) {
         let target = match name.rsplit_once('.') {
-            Some((of, what @ ("offset" | "scale"))) => {
+            Some((of, what))
+                if matches!(what, "offset" | "scale") || Term::named(what).is_some() =>
+            {
                 nuisance(case, data, name, of, what)
                     .map_err(|e| e.at("start"))?
                     .target
@@ -462,6 +494,14 @@ pub(super) fn correct(
                 "give one as in amplitude.scale=1.02",
             ));
         }
+        if let Target::Term(term, column) = target {
+            fixed.push((term, column, value));
+            notes.push(format!("corrected as stated: {name}={text}"));
+            continue;
+        }
+        if let Target::Scale(_) = target {
+            data.correct_terms(case, &std::mem::take(&mut fixed));
+        }
         for row in data.curves.iter_mut().flat_map(|curve| &mut curve.rows) {
             match target {
                 Target::Place(at) => row.at[at] += value,
@@ -472,7 +512,7 @@ pub(super) fn correct(
                     row.values[column] = row.values[column].map(|of| of / value);
                     row.errors[column] = row.errors[column].map(|of| of / value);
                 }
-                Target::Key(_) => {}
+                Target::Key(_) | Target::Term(..) => {}
             }
         }
         if let Target::Scale(column) = target {
@@ -480,5 +520,6 @@ pub(super) fn correct(
         }
         notes.push(format!("corrected as stated: {name}={text}"));
     }
+    data.correct_terms(case, &fixed);
     Ok(notes)
 }

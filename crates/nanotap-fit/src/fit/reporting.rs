@@ -184,7 +184,7 @@ impl Search<'_> {
             .filter(|(p, _)| p.is_of(curve) && !matches!(p.target, parameters::Target::Key(_)));
         let comment = own.map(|(p, value)| {
             let (name, value) = (&p.name, shortest(*value));
-            match p.unit(data, case) {
+            match p.unit(data, case).as_str() {
                 "1" => format!("# start: {name}={value}\n"),
                 unit => format!("# start: {name}={value} {unit}\n"),
             }
@@ -442,7 +442,7 @@ impl Search<'_> {
                     } else {
                         interval
                     },
-                    unit: parameter.unit(data, problem.case).to_owned(),
+                    unit: parameter.unit(data, problem.case),
                     start: parameter.start,
                     at_bound: *value <= parameter.bounds.0 || *value >= parameter.bounds.1,
                 }
@@ -649,7 +649,7 @@ fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
                 let residual = difference.map(|d| -d / problem.error(row, index));
                 let reading = Reading {
                     measured: row.values[index],
-                    model: known.then(|| problem.read(x, curve, index, value)),
+                    model: known.then(|| problem.read(x, curve, row, index, value)),
                     residual: residual.filter(|_| known),
                 };
                 (column.name.clone(), reading)
@@ -696,7 +696,8 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     let mut first = 0;
     for (curve, rows) in found.candidates.iter().enumerate() {
         for (row, candidates) in rows.iter().enumerate() {
-            let at = problem.place(x, curve, &data.curves[curve].rows[row]);
+            let measured = &data.curves[curve].rows[row];
+            let at = problem.place(x, curve, measured);
             let others_here = candidates
                 .iter()
                 .filter(|c| c.branch != chosen[first + row]);
@@ -705,7 +706,7 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
                 let Some(values) = values else { continue };
                 let columns = data.columns.iter().zip(values).enumerate();
                 let readings = columns.map(|(index, (column, value))| {
-                    (column.name.clone(), problem.read(x, curve, index, value))
+                    (column.name.clone(), problem.read(x, curve, measured, index, value))
                 });
                 others.push(OtherOrbit {
                     curve: data.curves[curve].name.clone(),

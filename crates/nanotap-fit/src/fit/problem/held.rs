@@ -341,7 +341,7 @@ impl Loop {
             if !of.is_of(curve) {
                 return Some((state, vec![0.0; columns.len()]));
             }
-            let mut by = of.direct(&point.values);
+            let mut by = vec![0.0; columns.len()];
             for (key, weight) in effects {
                 let (driven, found) = &by_key[keys.iter().position(|other| other == key)?];
                 let drive = [driven.frequency, driven.strength];

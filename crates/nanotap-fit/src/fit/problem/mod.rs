@@ -23,6 +23,7 @@ use crate::fit::jumps::{Fold, Jump};
 use crate::fit::parameters::{Parameter, Target};
 use crate::fit::solve::LeastSquares;
 use crate::fit::statistics::span;
+use crate::fit::terms::Term;
 use held::{HeldRow, Loop};
 pub(super) use rest::MAX_RINGING;
 use rest::Nearby;
@@ -173,7 +174,11 @@ impl Problem<'_> {
         let plain = |parameter: &Parameter| match parameter.target {
             Target::Key(key) => vec![(key, 1.0)],
             Target::Place(at) => vec![(self.data.swept[at].key, 1.0)],
-            Target::Offset(_) | Target::Scale(_) => Vec::new(),
+            // The weight is that of a row: `effects_at`.
+            Target::Term(Term::Drag | Term::Drift | Term::Backlash, _) => {
+                vec![(self.data.swept[0].key, 1.0)]
+            }
+            Target::Offset(_) | Target::Scale(_) | Target::Term(..) => Vec::new(),
         };
         let mut all: Vec<Vec<Effects>> = (0..self.data.curves.len())
             .map(|_| self.parameters.iter().map(plain).collect())
@@ -211,12 +216,29 @@ impl Problem<'_> {
         all
     }
 
+    /// The effects of each parameter at a row.
+    fn effects_at(&self, effects: &[Effects], curve: usize, row: &Row) -> Vec<Effects> {
+        let of = |(parameter, effects): (&Parameter, &Effects)| match parameter.target {
+            Target::Term(..) => {
+                let by = self.shift_by(parameter, curve, row);
+                let effects = effects.iter().filter(|_| by != 0.0);
+                effects.map(|(key, weight)| (*key, weight * by)).collect()
+            }
+            _ => effects.clone(),
+        };
+        self.parameters.iter().zip(effects).map(of).collect()
+    }
+
     /// Position of a row of a curve, with offsets.
     pub(super) fn place(&self, x: &[f64], curve: usize, row: &Row) -> Vec<f64> {
         let mut at = row.at.clone();
         for (parameter, value) in self.parameters.iter().zip(x) {
             if let (Target::Place(k), true) = (parameter.target, parameter.is_of(curve)) {
                 at[k] += value;
+            }
+            let shift = self.shift_by(parameter, curve, row);
+            if shift != 0.0 {
+                at[0] += value * shift;
             }
         }
         at
@@ -285,7 +307,14 @@ impl Problem<'_> {
     }
 
     /// The reading of the instrument in a column for the model's `value`.
-    pub(super) fn read(&self, x: &[f64], curve: usize, column: usize, value: f64) -> f64 {
+    pub(super) fn read(
+        &self,
+        x: &[f64],
+        curve: usize,
+        row: &Row,
+        column: usize,
+        value: f64,
+    ) -> f64 {
         let (mut scale, mut offset) = (1.0, 0.0);
         for (parameter, value) in self.parameters.iter().zip(x) {
             match parameter.target {
@@ -294,17 +323,29 @@ impl Problem<'_> {
                 _ => {}
             }
         }
-        scale * value + offset
+        scale * value + offset + self.terms(x, curve, row, column)
     }
 
     /// The change of a reading with the model's value.
     pub(super) fn scale(&self, x: &[f64], curve: usize, column: usize) -> f64 {
-        self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0)
+        let of = |(parameter, value): (&Parameter, &f64)| {
+            let is_scale = parameter.target == Target::Scale(column) && parameter.is_of(curve);
+            is_scale.then_some(*value)
+        };
+        let mut scales = self.parameters.iter().zip(x).filter_map(of);
+        scales.next().unwrap_or(1.0)
     }
 
     /// A measured value without scale and offset.
-    pub(super) fn unread(&self, x: &[f64], curve: usize, column: usize, value: f64) -> f64 {
-        (value - self.read(x, curve, column, 0.0)) / self.scale(x, curve, column)
+    pub(super) fn unread(
+        &self,
+        x: &[f64],
+        curve: usize,
+        row: &Row,
+        column: usize,
+        value: f64,
+    ) -> f64 {
+        (value - self.read(x, curve, row, column, 0.0)) / self.scale(x, curve, column)
     }
 
     /// The standard error of a measured value.
@@ -321,7 +362,7 @@ impl Problem<'_> {
         column: usize,
         value: f64,
     ) -> Option<f64> {
-        let difference = self.read(x, curve, column, value) - row.values[column]?;
+        let difference = self.read(x, curve, row, column, value) - row.values[column]?;
         Some(if self.data.columns[column].quantity.is_angle() {
             difference - 360.0 * (difference / 360.0).round()
         } else {
@@ -395,7 +436,7 @@ impl Problem<'_> {
             let columns = &self.data.columns;
             let named = |c: &Column| names.contains(&c.quantity.name());
             let column = columns.iter().position(named)?;
-            Some(self.unread(x, curve, column, row.values[column]?))
+            Some(self.unread(x, curve, row, column, row.values[column]?))
         };
         let amplitude = known(["first_harmonic", "amplitude"])?;
         let amplitude = match self.case.physical() {
@@ -492,24 +533,31 @@ impl Problem<'_> {
     /// Model minus measured location of a jump, in standard errors; 0 if there is no fold.
     pub(super) fn jump_residual(&self, x: &[f64], point: &Point, index: usize) -> f64 {
         let (jump, fold) = (&self.jumps[index], &point.folds[index]);
-        let offset: f64 = self
-            .parameters
-            .iter()
-            .zip(x)
-            .filter(|(p, _)| p.target == Target::Place(0) && p.is_of(jump.curve))
-            .map(|(_, value)| value)
-            .sum();
+        let all = self.parameters.iter().zip(x);
+        let offset: f64 = all.map(|(p, value)| self.shift_of_jump(p, jump) * value).sum();
         fold.as_ref()
             .map_or(0.0, |fold| (fold.at - offset - jump.at()) / jump.error())
+    }
+
+    /// Change of the place of a jump by a parameter that changes the distances of rows, per unit of
+    /// its value.
+    fn shift_of_jump(&self, parameter: &Parameter, jump: &Jump) -> f64 {
+        if parameter.target == Target::Place(0) {
+            return f64::from(u8::from(parameter.is_of(jump.curve)));
+        }
+        let Target::Term(..) = parameter.target else {
+            return 0.0;
+        };
+        let rows = &self.data.curves[jump.curve].rows;
+        let first = self.index_of(jump.curve);
+        let of = jump.rows.map(|row| self.shift_by(parameter, jump.curve, &rows[row - first]));
+        0.5 * (of[0] + of[1])
     }
 
     /// Derivatives of the residual of a jump.
     fn jump_derivatives(&self, effects: &[Vec<Effects>], point: &Point, index: usize) -> Vec<f64> {
         let (jump, fold) = (&self.jumps[index], &point.folds[index]);
-        let offset = |parameter: &Parameter| {
-            let is_offset = parameter.target == Target::Place(0) && parameter.is_of(jump.curve);
-            f64::from(u8::from(is_offset))
-        };
+        let offset = |parameter: &Parameter| self.shift_of_jump(parameter, jump);
         // A location that does not change still has its offset.
         let still = || {
             let parameters = self.parameters.iter();
@@ -648,7 +696,7 @@ impl Problem<'_> {
             if !parameter.is_of(curve) {
                 return Some((state, vec![0.0; columns.len()]));
             }
-            let mut by = parameter.direct(&point.values);
+            let mut by = vec![0.0; columns.len()];
             for (key, weight) in effects {
                 let derivative = &by_key[keys.binary_search(key).ok()?];
                 state
@@ -746,8 +794,9 @@ impl LeastSquares for Problem<'_> {
                     difference.map_or(0.0, |d| self.counted(d / self.error(row, column)).0)
                 })
             });
-        let count = rows.len() * columns.len() + self.jumps.len();
-        DVector::from_iterator(count, all.chain(jumps))
+        let priors = self.prior_residuals(x);
+        let count = rows.len() * columns.len() + self.jumps.len() + priors.len();
+        DVector::from_iterator(count, all.chain(jumps).chain(priors))
     }
 
     fn jacobian(&self, x: &[f64], point: &mut Point) -> Option<DMatrix<f64>> {
@@ -768,7 +817,7 @@ impl LeastSquares for Problem<'_> {
                 if point.lost || self.finished(()).is_none() {
                     return block;
                 }
-                let effects = &effects[*curve];
+                let effects = &self.effects_at(&effects[*curve], *curve, row);
                 let by: Option<Vec<_>> = match (self.held, &nearby) {
                     (Some(_), _) => Loop::derivatives(self, x, (*curve, point), effects),
                     (_, Some(nearby)) => {
@@ -789,14 +838,22 @@ impl LeastSquares for Problem<'_> {
                         };
                         let error = self.error(row, column);
                         let slope = self.counted(difference / error).1;
-                        block[(column, k)] = slope * values[column] / error;
+                        let direct = self.direct(x, (*curve, row), k, (column, value));
+                        block[(column, k)] = slope * (values[column] + direct) / error;
                     }
                 }
                 point.states = by.into_iter().map(|(state, _)| state).collect();
                 block
             })
             .collect();
-        let mut jacobian = DMatrix::zeros(rows.len() * columns + jumps.len(), count);
+        let priors: Vec<(usize, f64)> = (self.parameters.iter().enumerate())
+            .filter_map(|(k, parameter)| Some((k, parameter.prior?[1])))
+            .collect();
+        let first = rows.len() * columns + jumps.len();
+        let mut jacobian = DMatrix::zeros(first + priors.len(), count);
+        for (row, (k, deviation)) in priors.into_iter().enumerate() {
+            jacobian[(first + row, k)] = 1.0 / deviation;
+        }
         for (row, block) in blocks.iter().enumerate() {
             jacobian.rows_mut(row * columns, columns).copy_from(block);
         }

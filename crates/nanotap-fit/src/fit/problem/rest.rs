@@ -224,8 +224,10 @@ impl Problem<'_> {
                 continue;
             }
             let jump = |index: usize| {
-                let read = |of: &RowPoint| self.read(x, curve, index, of.values[index]);
-                (read(to) - read(from)).abs()
+                let read = |row: usize, of: &RowPoint| {
+                    self.read(x, curve, &measured[row], index, of.values[index])
+                };
+                (read(first, to) - read(last, from)).abs()
             };
             let jump: Vec<f64> = (0..self.data.columns.len()).map(jump).collect();
             let after = first..points.len().min(first + MAX_RINGING);
@@ -368,7 +370,6 @@ impl Nearby {
         let parameter = |(parameter, effects): (&Parameter, &Effects)| {
             let mut by = vec![0.0; columns.len()];
             if parameter.is_of(curve) {
-                by = parameter.direct(&point.values);
                 for (key, weight) in effects {
                     for (column, slope) in by_key(*key)?.into_iter().enumerate() {
                         by[column] += weight * problem.scale(x, curve, column) * slope;

@@ -1,5 +1,7 @@
 //! Fits of the same data under several contact laws.
 
+use std::collections::BTreeSet;
+
 use super::report::{ComparedLaw, FitReport};
 use super::{FitOptions, fit_one, implied_case, names};
 use nanotap_case::under_law::LawName;
@@ -77,9 +79,16 @@ pub(super) fn compare(
             found.push((law.text(), fitted));
         }
     }
+    // The criteria of different rows cannot be compared.
+    let rows = common_rows(&found);
+    for report in found.iter_mut().filter_map(|(_, fitted)| fitted.as_mut().ok()) {
+        if is_judged(report) {
+            [report.aic, report.bic] = report.likelihood.criteria(&rows);
+        }
+    }
     let rank = |fitted: &Result<FitReport, Error>| match fitted {
-        Ok(report) => (!report.fits, report.aic),
-        Err(_) => (true, f64::INFINITY),
+        Ok(report) if is_judged(report) => (!report.fits, report.aic),
+        _ => (true, f64::INFINITY),
     };
     let order = |a: &(bool, f64), b: &(bool, f64)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
     let best = (0..found.len()).min_by(|a, b| order(&rank(&found[*a].1), &rank(&found[*b].1)));
@@ -93,6 +102,8 @@ pub(super) fn compare(
     let (law, report) = found.swap_remove(best);
     let mut report = report?;
     report.remarks.extend(cautions(&law, &compared));
+    let count = report.likelihood.rows.len();
+    report.remarks.extend(lost_rows(&compared, rows.len(), count));
     report.law = Some(law);
     report.laws = compared;
     report.cancelled |= control.is_cancelled();
@@ -126,25 +137,53 @@ pub(super) fn between(low: f64, high: f64) -> f64 {
     }
 }
 
+/// Whether a law has orbits for at least half of the rows, so that the others may be left out.
+fn is_judged(report: &FitReport) -> bool {
+    2 * report.rows_without_orbit <= report.likelihood.rows.len()
+}
+
+/// The rows that have an orbit under every law that is judged.
+fn common_rows(found: &[(String, Result<FitReport, Error>)]) -> BTreeSet<(String, u64)> {
+    let reports = found.iter().filter_map(|(_, fitted)| fitted.as_ref().ok());
+    let rows = reports.filter(|report| is_judged(report)).map(|report| report.likelihood.with_orbit());
+    rows.reduce(|a, b| &a & &b).unwrap_or_default()
+}
+
+/// Says over which rows the criteria are, where a law has no orbit at some.
+fn lost_rows(laws: &[ComparedLaw], common: usize, all: usize) -> Option<String> {
+    let of = laws.iter().filter_map(|law| {
+        let lost = law.rows_without_orbit.filter(|lost| *lost > 0)?;
+        Some(format!("{lost} under {}", law.law))
+    });
+    let of: Vec<String> = of.collect();
+    (!of.is_empty()).then(|| {
+        format!(
+            "rows without an orbit: {}; the criteria are over the {common} of {all} rows that have one \
+             under every law with orbits for at least half of them",
+            of.join(", ")
+        )
+    })
+}
+
 fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
-    let least = found
-        .iter()
-        .filter_map(|(_, fitted)| Some(fitted.as_ref().ok()?.aic));
-    let least = least.fold(f64::INFINITY, f64::min);
+    let judged = || {
+        let reports = found.iter().filter_map(|(_, fitted)| fitted.as_ref().ok());
+        reports.filter(|report| is_judged(report)).map(|report| report.aic)
+    };
+    let least = judged().fold(f64::INFINITY, f64::min);
     let likelihood = |aic: f64| nanotap_arithmetic::exp(0.5 * (least - aic));
-    let all: f64 = found
-        .iter()
-        .filter_map(|(_, fitted)| Some(likelihood(fitted.as_ref().ok()?.aic)))
-        .sum();
+    let all: f64 = judged().map(likelihood).sum();
+    let if_judged = |report: &FitReport, value: f64| is_judged(report).then_some(value);
     let row = |(law, fitted): &(String, Result<FitReport, Error>)| match fitted {
         Ok(report) => ComparedLaw {
             law: law.clone(),
             fits: report.fits,
             reason: report.reason.clone(),
-            aic: Some(report.aic),
-            bic: Some(report.bic),
-            above_best: Some(report.aic - least),
-            weight: Some(likelihood(report.aic) / all),
+            aic: if_judged(report, report.aic),
+            bic: if_judged(report, report.bic),
+            above_best: if_judged(report, report.aic - least),
+            weight: if_judged(report, likelihood(report.aic) / all),
+            rows_without_orbit: Some(report.rows_without_orbit),
             chi2: Some(report.chi2),
             degrees_of_freedom: Some(report.degrees_of_freedom),
             parameters: report.parameters.clone(),
@@ -159,6 +198,7 @@ fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
             bic: None,
             above_best: None,
             weight: None,
+            rows_without_orbit: None,
             chi2: None,
             degrees_of_freedom: None,
             parameters: Vec::new(),

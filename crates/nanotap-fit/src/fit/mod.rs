@@ -43,6 +43,7 @@ mod search;
 mod selection;
 mod solve;
 mod statistics;
+mod suggestions;
 pub(crate) mod terms;
 pub(crate) mod thin;
 
@@ -60,7 +61,7 @@ use nanotap_observe::frame::Frame;
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, Estimate, FitReport, FittedColumn, FittedForceCurve, FittedJump,
-    FittedParameter, FittedRow, OtherOrbit, Reading, Undetermined,
+    FittedParameter, FittedRow, OtherOrbit, Reading, Suggestion, Undetermined,
 };
 
 pub use selection::Segment;

@@ -1,6 +1,6 @@
 //! Report of a fit.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,12 +27,18 @@ pub struct FitReport {
     pub p_value: Option<f64>,
     /// Akaike's criterion, −2 ln L + 2 p. Of two laws fitted to the same data, the one with the
     /// smaller value describes them better for its number of parameters, significantly if the
-    /// difference is above about ten. It does not show whether either law is right. A row without
-    /// an orbit counts as a residual of the whole spread of its column.
+    /// difference is above about ten. It does not show whether either law is right. It is over the
+    /// rows with an orbit; of compared laws, over those that have one under each of them.
     pub aic: f64,
     /// Schwarz's criterion, −2 ln L + p ln n, whose penalty grows with the logarithm of the number
     /// of measured values.
     pub bic: f64,
+    /// Number of rows without an orbit, which do not count.
+    #[serde(default)]
+    pub rows_without_orbit: usize,
+    /// The likelihood of every row.
+    #[serde(skip)]
+    pub(super) likelihood: Likelihood,
     /// Contact law of this fit, if several were compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law: Option<String>,
@@ -56,6 +62,9 @@ pub struct FitReport {
     /// What was done to the data before the fit: conversions, guesses, fixed corrections, averages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub preparation: Vec<String>,
+    /// Corrections and terms of the instrument that the residuals show, the clearest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub suggestions: Vec<Suggestion>,
     /// Combinations of parameters that the data do not determine.
     pub undetermined: Vec<Undetermined>,
     /// Correlations of the parameters, in their order; 0 for undetermined ones.
@@ -124,6 +133,7 @@ impl FitReport {
             "bic", "BIC", Digits(6) => |law| law.bic;
             "above_best", "above the least", Digits(3) => |law| law.above_best;
             "weight", "weight", Digits(3) => |law| law.weight;
+            "rows_without_orbit", "rows without an orbit", Plain => |law| law.rows_without_orbit;
             "fits", "fits", Plain => |law| if law.fits { "yes" } else { "no" };
             .aligned(Right, Right);
         }
@@ -204,6 +214,45 @@ pub struct FittedForceCurve {
     pub cautions: Vec<String>,
 }
 
+/// The likelihood of the rows of a fit.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Likelihood {
+    pub(super) rows: Vec<RowLikelihood>,
+    /// Number of parameters, estimated standard errors among them.
+    pub(super) parameters: usize,
+}
+
+/// The likelihood of a row.
+#[derive(Clone, Debug)]
+pub(super) struct RowLikelihood {
+    /// Its curve and line.
+    pub(super) row: (String, u64),
+    /// −2 ln L of its values.
+    pub(super) deviance: f64,
+    /// Number of its values.
+    pub(super) values: usize,
+    /// Whether it has no orbit.
+    pub(super) lost: bool,
+}
+
+impl Likelihood {
+    /// The rows with an orbit.
+    pub(super) fn with_orbit(&self) -> BTreeSet<(String, u64)> {
+        let rows = self.rows.iter().filter(|row| !row.lost);
+        rows.map(|row| row.row.clone()).collect()
+    }
+
+    /// The criteria of Akaike and of Schwarz over some of the rows.
+    pub(super) fn criteria(&self, over: &BTreeSet<(String, u64)>) -> [f64; 2] {
+        let rows = || self.rows.iter().filter(|row| over.contains(&row.row));
+        let deviance: f64 = rows().map(|row| row.deviance).sum();
+        let values: usize = rows().map(|row| row.values).sum();
+        let parameters = self.parameters as f64;
+        let prices = [2.0, nanotap_arithmetic::ln(values.max(1) as f64)];
+        prices.map(|price| deviance + price * parameters)
+    }
+}
+
 /// A contact law among others that were fitted to the same data.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ComparedLaw {
@@ -214,15 +263,19 @@ pub struct ComparedLaw {
     /// Reason if it does not, or if it could not be fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Akaike's criterion; missing if nothing was fitted.
+    /// Akaike's criterion over the rows that have an orbit under every law; missing if nothing was
+    /// fitted, or if more than half of the rows have no orbit.
     pub aic: Option<f64>,
-    /// Schwarz's criterion, −2 ln L + p ln n; missing if nothing was fitted.
+    /// Schwarz's criterion, −2 ln L + p ln n, over the same rows; missing where Akaike's is.
     pub bic: Option<f64>,
     /// Difference of Akaike's criterion from the smallest one.
     pub above_best: Option<f64>,
     /// Akaike's weight, exp(−above/2) over the sum of all: the share of the evidence, if one of
     /// these laws is right.
     pub weight: Option<f64>,
+    /// Number of rows without an orbit under this law.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows_without_orbit: Option<usize>,
     /// Sum of the squared residuals, each in standard errors; dimensionless.
     pub chi2: Option<f64>,
     /// Number of measured values minus number of parameters.
@@ -267,6 +320,27 @@ pub struct FittedParameter {
     pub start: f64,
     /// Whether the best value is at a bound.
     pub at_bound: bool,
+}
+
+/// A correction or a term of the instrument that the residuals show and that is not free.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Suggestion {
+    /// Name of the parameter.
+    pub key: String,
+    /// Its value to first order, of an interference its period, in `unit`.
+    pub value: f64,
+    /// Unit of the value in SI, `1` if there is none.
+    pub unit: String,
+    /// By how much Akaike's criterion would fall, to first order.
+    pub fall_of_aic: f64,
+    /// Correlation of the term, less what the free parameters can describe, with the residuals,
+    /// −1 to 1.
+    pub correlation: f64,
+    /// The parameters to name in `free`: those of the request, the suggestions before this one, and
+    /// this one.
+    pub free: Vec<String>,
+    /// Sentence that describes it.
+    pub words: String,
 }
 
 /// A combination of parameters that the data do not determine.

@@ -15,8 +15,8 @@ use super::parameters::{self, Parameter, Target};
 use super::problem::{Problem, RowPoint};
 use super::profile::{Profile, profile};
 use super::report::{
-    CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, OtherOrbit,
-    Reading, Undetermined,
+    CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, Likelihood,
+    OtherOrbit, Reading, RowLikelihood, Undetermined,
 };
 use super::search::{Found, MIN_PROBABILITY, Search, branches_of};
 use super::solve::LeastSquares as _;
@@ -49,36 +49,58 @@ const MAX_ENDED: usize = 2;
 
 impl Search<'_> {
     /// The problem with the standard errors and the jumps of a result.
-    fn problem_of(&self, found: &Found) -> Problem<'_> {
+    pub(super) fn problem_of(&self, found: &Found) -> Problem<'_> {
         let mut problem = self.weighted(found.noise.clone(), None);
         problem.jumps.clone_from(&found.jumps);
         problem
     }
 
-    /// The criteria of Akaike and of Schwarz. Estimated standard errors count as parameters, and
-    /// values of rows without an orbit as residuals of their column's spread.
-    fn criteria(&self, found: &Found) -> [f64; 2] {
-        let rows = self.problem.data.rows();
-        let point = &found.solution.point;
-        // Another law may have no fold: the jumps are left out.
-        let mut deviance = found.solution.cost - self.squared_jumps(found);
-        let mut estimated = vec![false; found.noise.len()];
-        for (row, point) in rows.zip(point.iter()) {
-            for (column, noise) in found.noise.iter().enumerate() {
-                if row.values[column].is_some() {
-                    estimated[column] |= row.errors[column].is_none();
-                    let error = row.errors[column].unwrap_or(row.relative[column] * noise);
-                    deviance += nanotap_arithmetic::ln(std::f64::consts::TAU * error * error);
-                    if point.lost {
-                        deviance += (self.problem.data.columns[column].spread / error).powi(2);
-                    }
-                }
+    /// The likelihood of every row: −2 ln L of its values, without the places of jumps, because
+    /// another law may have no fold.
+    pub(super) fn likelihood(&self, found: &Found) -> Likelihood {
+        let data = self.problem.data;
+        let x = &found.solution.x;
+        let rows = self.problem.rows().into_iter().zip(found.solution.point.iter());
+        let row = |((curve, row), point): ((usize, &Row), &RowPoint)| {
+            let known = (0..data.columns.len()).filter(|column| row.values[*column].is_some());
+            let deviance = known.clone().map(|column| {
+                let error = row.errors[column].unwrap_or(row.relative[column] * found.noise[column]);
+                let value = point.values[column];
+                let difference = self.problem.difference(x, curve, row, column, value);
+                let residual = if point.lost {
+                    data.columns[column].spread / error
+                } else {
+                    difference.unwrap_or(0.0) / error
+                };
+                residual * residual + nanotap_arithmetic::ln(std::f64::consts::TAU * error * error)
+            });
+            RowLikelihood {
+                row: (data.curves[curve].name.clone(), row.line),
+                deviance: deviance.sum(),
+                values: known.count(),
+                lost: point.lost,
             }
+        };
+        let estimated = |column: &usize| {
+            let mut rows = data.rows();
+            rows.any(|row| row.values[*column].is_some() && row.errors[*column].is_none())
+        };
+        let estimated = (0..data.columns.len()).filter(estimated).count();
+        Likelihood {
+            rows: rows.map(row).collect(),
+            parameters: self.problem.parameters.len() + estimated,
         }
-        let estimated = estimated.iter().filter(|estimated| **estimated).count();
-        let parameters = (self.problem.parameters.len() + estimated) as f64;
-        let count = self.problem.data.count() as f64;
-        [2.0, nanotap_arithmetic::ln(count)].map(|price| deviance + price * parameters)
+    }
+
+    /// Sum of the squared residuals of the priors.
+    fn squared_priors(&self, found: &Found) -> f64 {
+        let all = self.problem.prior_residuals(&found.solution.x);
+        all.iter().map(|residual| residual * residual).sum()
+    }
+
+    /// Sum of the squared residuals of values and jumps.
+    pub(super) fn chi2(&self, found: &Found) -> f64 {
+        found.solution.cost - self.squared_priors(found)
     }
 
     /// Creates the report of a result from this many initial values.
@@ -117,13 +139,17 @@ impl Search<'_> {
         } else {
             Vec::new()
         };
-        let [aic, bic] = self.criteria(found);
+        let likelihood = self.likelihood(found);
+        let with_orbit = likelihood.with_orbit();
+        let [aic, bic] = likelihood.criteria(&with_orbit);
         FitReport {
-            chi2: found.solution.cost,
+            chi2: self.chi2(found),
             degrees_of_freedom: self.freedom(found),
             p_value,
             aic,
             bic,
+            rows_without_orbit: likelihood.rows.len() - with_orbit.len(),
+            likelihood,
             law: None,
             laws: Vec::new(),
             fits: reason.is_none(),
@@ -132,6 +158,7 @@ impl Search<'_> {
             turned: false,
             remarks,
             preparation: self.preparation.to_vec(),
+            suggestions: self.suggestions(found),
             undetermined,
             correlations: (0..parameters.len())
                 .map(|i| information.correlations.row(i).iter().copied().collect())
@@ -395,8 +422,16 @@ impl Search<'_> {
 
     /// True if one fit describes as much of the data better than another.
     fn is_better(&self, this: &Found, other: &Found) -> bool {
-        let deviance = |of: &Found| self.criteria(of)[0] + self.squared_jumps(of);
+        let deviance = |of: &Found| self.whole_criterion(of) + self.squared_jumps(of);
         this.jumps.len() >= other.jumps.len() && deviance(this) < deviance(other)
+    }
+
+    /// Akaike's criterion over all rows, where the values of one without an orbit count as residuals
+    /// of their column's spread: between fits of one law, a lost row is no gain.
+    pub(super) fn whole_criterion(&self, found: &Found) -> f64 {
+        let likelihood = self.likelihood(found);
+        let deviance: f64 = likelihood.rows.iter().map(|row| row.deviance).sum();
+        deviance + self.squared_priors(found) + 2.0 * likelihood.parameters as f64
     }
 
     /// Contribution of the jumps to chi2.
@@ -611,7 +646,7 @@ impl Search<'_> {
             format!(
                 "chi2 = {:.4e} with {} degrees of freedom: the residuals are larger than the \
                  standard errors that the data give",
-                found.solution.cost,
+                self.chi2(found),
                 self.freedom(found)
             )
         });

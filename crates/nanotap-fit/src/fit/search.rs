@@ -433,7 +433,7 @@ impl<'a> Search<'a> {
     }
 
     pub(super) fn probability(&self, found: &Found) -> f64 {
-        exceeding(found.solution.cost, self.freedom(found) as f64)
+        exceeding(self.chi2(found), self.freedom(found) as f64)
     }
 }
 

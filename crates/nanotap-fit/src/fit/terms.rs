@@ -391,9 +391,11 @@ pub(super) fn periods([near, far]: [f64; 2], [low, high]: [f64; 2]) -> Vec<f64> 
     (0..=count).map(|k| range / at(k)).collect()
 }
 
-/// Depth of a row below the farthest one, for a sinusoid.
-pub(super) fn depth(row: &Row) -> f64 {
-    row.ramp.depth
+impl Row {
+    /// Distance from the farthest row, without offsets; not above 0.
+    pub(super) const fn depth(&self) -> f64 {
+        self.ramp.depth
+    }
 }
 
 impl Problem<'_> {

@@ -387,6 +387,7 @@ impl Map {
             pixels: Vec::new(),
             map: MapFile::default(),
             profile: false,
+            rivals: false,
             ..options.clone()
         };
         let mut map = Self {

@@ -39,6 +39,7 @@ mod profile;
 mod quantity;
 mod report;
 mod reporting;
+mod rivals;
 mod search;
 mod selection;
 mod solve;
@@ -61,7 +62,7 @@ use nanotap_observe::frame::Frame;
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, Estimate, FitReport, FittedColumn, FittedForceCurve, FittedJump,
-    FittedParameter, FittedRow, OtherOrbit, Reading, Suggestion, Undetermined,
+    FittedParameter, FittedRow, OtherOrbit, Reading, Rival, RivalParameter, Suggestion, Undetermined,
 };
 
 pub use selection::Segment;
@@ -165,6 +166,9 @@ options! {
         /// Intervals from the profile of the likelihood
         #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
         pub profile: bool = true,
+        /// Search for other minima that describe the data about as well
+        #[schemars(extend("x-no" = "Do not search for other minima"))]
+        pub rivals: bool = true,
     }
 }
 

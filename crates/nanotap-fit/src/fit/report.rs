@@ -62,6 +62,9 @@ pub struct FitReport {
     /// What was done to the data before the fit: conversions, guesses, fixed corrections, averages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub preparation: Vec<String>,
+    /// Other minima that describe the data about as well, and what would decide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rivals: Vec<Rival>,
     /// Corrections and terms of the instrument that the residuals show, the clearest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub suggestions: Vec<Suggestion>,
@@ -320,6 +323,37 @@ pub struct FittedParameter {
     pub start: f64,
     /// Whether the best value is at a bound.
     pub at_bound: bool,
+}
+
+/// Another minimum that describes the data about as well as the best fit.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Rival {
+    /// The free parameters there, in the order of the request.
+    pub parameters: Vec<RivalParameter>,
+    /// Akaike's criterion less that of the best fit, over the rows where both have orbits.
+    pub above_best: f64,
+    /// Sum of the squared residuals there, each in standard errors; dimensionless.
+    pub chi2: f64,
+    /// Column that would decide between this minimum and the best fit; missing if none is known.
+    pub decides: Option<String>,
+    /// Sentence that says what would decide.
+    pub words: String,
+}
+
+/// A free parameter in another minimum.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct RivalParameter {
+    /// Name of the parameter.
+    pub key: String,
+    /// Name of the curve to which the parameter applies; without it, all curves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<String>,
+    /// Its value there, in `unit`.
+    pub value: f64,
+    /// Its standard error, in `unit`; missing if the data do not determine it there.
+    pub standard_error: Option<f64>,
+    /// Unit of the values in SI, `1` if there is none.
+    pub unit: String,
 }
 
 /// A correction or a term of the instrument that the residuals show and that is not free.

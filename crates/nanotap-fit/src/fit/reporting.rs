@@ -104,9 +104,10 @@ impl Search<'_> {
     }
 
     /// Creates the report of a result from this many initial values.
-    pub(super) fn report(&self, found: Found, starts: usize) -> FitReport {
+    pub(super) fn report(&self, found: Found, rivals: &[Found], starts: usize) -> FitReport {
         let (found, intervals) = self.with_intervals(found);
         let found = &found;
+        let rivals = self.report_rivals(found, &intervals, rivals);
         let (case, data) = (self.problem.case, self.problem.data);
         let parameters = self.problem.parameters;
         let problem = self.problem_of(found);
@@ -158,6 +159,7 @@ impl Search<'_> {
             turned: false,
             remarks,
             preparation: self.preparation.to_vec(),
+            rivals,
             suggestions: self.suggestions(found),
             undetermined,
             correlations: (0..parameters.len())
@@ -220,7 +222,7 @@ impl Search<'_> {
     }
 
     /// Information about the parameters from the Jacobian at the best values.
-    fn information(&self, found: &Found) -> Information {
+    pub(super) fn information(&self, found: &Found) -> Information {
         let parameters = self.problem.parameters.iter();
         let sizes: Vec<f64> = parameters
             .zip(&found.solution.x)
@@ -421,7 +423,7 @@ impl Search<'_> {
     }
 
     /// True if one fit describes as much of the data better than another.
-    fn is_better(&self, this: &Found, other: &Found) -> bool {
+    pub(super) fn is_better(&self, this: &Found, other: &Found) -> bool {
         let deviance = |of: &Found| self.whole_criterion(of) + self.squared_jumps(of);
         this.jumps.len() >= other.jumps.len() && deviance(this) < deviance(other)
     }

@@ -65,6 +65,7 @@ impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
         let (starts, first) = self.starts();
         let mut best: Option<Found> = None;
+        let mut others: Vec<Found> = Vec::new();
         let mut least_rough = 0.0;
         let mut tried = 0;
         for start in &starts {
@@ -96,7 +97,9 @@ impl<'a> Search<'a> {
             let misfit = self.misfit(&found);
             let least = best.as_ref().map(|best| self.misfit(best));
             if least.is_none_or(|least| misfit < least) {
-                best = Some(found);
+                others.extend(best.replace(found));
+            } else {
+                others.push(found);
             }
             // Two initial values that lead to the same minimum are enough to accept it.
             if good || least.is_some_and(|least| (misfit - least).abs() <= MISFIT_TOLERANCE * least)
@@ -117,7 +120,12 @@ impl<'a> Search<'a> {
                 .remedy("change the case, or give {bounds} and more {starts}")
             }
         })?;
-        Ok(self.report(best, tried))
+        let (best, rivals) = if self.request.rivals && self.describes(&best) {
+            self.rivals(best, others)
+        } else {
+            (best, Vec::new())
+        };
+        Ok(self.report(best, &rivals, tried))
     }
 
     /// Initial values: those of a scan, if it finds better ones than the case's, and those of the
@@ -185,7 +193,7 @@ impl<'a> Search<'a> {
 
     /// Fits from initial values until branches and parameters are approximately right, and returns
     /// the mean cost of a value; infinite without a fit.
-    fn rough(&self, mut x: Vec<f64>) -> (Vec<f64>, f64) {
+    pub(super) fn rough(&self, mut x: Vec<f64>) -> (Vec<f64>, f64) {
         let mut mean = f64::INFINITY;
         let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
         // Given errors are much smaller; they are used in the end, as are all rows.

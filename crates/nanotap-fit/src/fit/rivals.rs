@@ -1,0 +1,267 @@
+//! Other minima that describe the data of an accepted fit about as well.
+//!
+//! The attraction and the stiffness of the contact are multiplied and divided by a factor, the
+//! distance is aligned anew, and the fit is repeated from there: rough, and in full if the rough fit
+//! is about as good as the accepted one and ends elsewhere. A minimum whose criterion of Akaike is
+//! within [`REACH`] of the best one is a rival. What decides between two of them is the observable of
+//! their orbits, not measured so far, that differs most for the noise of the data.
+//!
+//! Fails by omission: minima that none of these starts leads to.
+
+use nalgebra::DVector;
+use nanotap_case::Key;
+use nanotap_observe::{OBSERVABLES, Observable, ObservableSet, measure};
+
+use super::parameters::Target;
+use super::problem::RowPoint;
+use super::report::{Rival, RivalParameter};
+use super::search::{Found, Search};
+
+/// Difference of Akaike's criterion up to which a minimum is within the reach of the data (Burnham &
+/// Anderson, Model Selection and Multimodel Inference, 2nd ed. 2002, Sect. 2.6).
+const REACH: f64 = 10.0;
+/// Factor of attraction and stiffness.
+const FACTOR: f64 = 8.0;
+/// Mean rough cost of a value, relative to that of the best fit and beyond it, up to which a start
+/// is followed to its minimum.
+const ROUGH_REACH: (f64, f64) = (1.5, 0.01);
+/// Two minima are the same if the residuals change by less than this between them, to first order,
+/// in standard errors.
+const SAME: f64 = 1.0;
+/// Part of the rows that may have no orbit in a rival.
+const MAX_LOST: f64 = 0.1;
+/// Difference of an observable over all rows, in standard errors, that decides.
+const DECISIVE: f64 = 6.0;
+/// Observables that might decide, as a lock-in amplifier or a recorder measures them.
+const DECIDERS: [&str; 4] = ["phase", "first_harmonic", "mean_deflection", "second_harmonic"];
+
+const ATTRACTIONS: [Key; 3] = [
+    Key::SampleHamaker,
+    Key::SampleWorkOfAdhesion,
+    Key::SampleAdhesionForce,
+];
+const STIFFNESSES: [Key; 3] = [Key::SampleModulus, Key::SampleStiffness, Key::Alpha4];
+
+impl Search<'_> {
+    /// Searches for the other minima of an accepted fit; returns the best one, and the others that
+    /// are within reach. `others` were found before.
+    pub(super) fn rivals(&self, best: Found, others: Vec<Found>) -> (Found, Vec<Found>) {
+        let mut all = vec![best];
+        all.extend(others);
+        let (_, cost) = self.rough(all[0].solution.x.clone());
+        let most = ROUGH_REACH.0 * cost + ROUGH_REACH.1;
+        for start in self.starts_of_rivals(&all[0]) {
+            if self.control.is_cancelled() {
+                break;
+            }
+            let start = self.with_best_offset(&start).unwrap_or(start);
+            let (x, cost) = self.rough(start);
+            if cost > most || all.iter().any(|known| self.is_same(known, &x)) {
+                continue;
+            }
+            all.extend(self.fine(x));
+        }
+        let least = (1..all.len()).fold(0, |least, k| {
+            if self.is_better(&all[k], &all[least]) {
+                k
+            } else {
+                least
+            }
+        });
+        let best = all.swap_remove(least);
+        let mut rivals: Vec<Found> = Vec::new();
+        for other in all {
+            let known = rivals.iter().chain([&best]);
+            let is_new = known.into_iter().all(|known| {
+                !(self.is_same(known, &other.solution.x) || self.is_same(&other, &known.solution.x))
+            });
+            let lost = other.solution.point.iter().filter(|row| row.lost).count() as f64;
+            let few = lost <= MAX_LOST * other.solution.point.len() as f64;
+            if is_new && few && self.above(&other, &best) < REACH {
+                rivals.push(other);
+            }
+        }
+        (best, rivals)
+    }
+
+    /// Initial values for the search: attraction and stiffness changed by a factor.
+    fn starts_of_rivals(&self, best: &Found) -> Vec<Vec<f64>> {
+        let mut starts = Vec::new();
+        for keys in [&ATTRACTIONS, &STIFFNESSES] {
+            for factor in [FACTOR, FACTOR.recip()] {
+                let mut start = best.solution.x.clone();
+                for (k, parameter) in self.problem.parameters.iter().enumerate() {
+                    let Target::Key(key) = parameter.target else {
+                        continue;
+                    };
+                    if keys.contains(&key) {
+                        let (low, high) = parameter.bounds;
+                        let of = if start[k] == 0.0 { parameter.start } else { start[k] };
+                        start[k] = (factor * of).clamp(low, high);
+                    }
+                }
+                if start != best.solution.x {
+                    starts.push(start);
+                }
+            }
+        }
+        starts
+    }
+
+    /// Whether values lie at a minimum, to first order in its residuals.
+    fn is_same(&self, found: &Found, x: &[f64]) -> bool {
+        let change = DVector::from_fn(x.len(), |k, _| x[k] - found.solution.x[k]);
+        (&found.solution.jacobian * change).norm() < SAME
+    }
+
+    /// By how much Akaike's criterion of one fit is above that of another, over the rows where both
+    /// have orbits.
+    fn above(&self, this: &Found, other: &Found) -> f64 {
+        let [a, b] = [this, other].map(|of| self.likelihood(of));
+        let rows = &a.with_orbit() & &b.with_orbit();
+        let [a, b] = [a, b].map(|of| of.criteria(&rows)[0]);
+        a - b
+    }
+
+    /// Reports rivals, and what decides between each and the best fit, whose intervals are given. A
+    /// rival within all of them is not another one.
+    pub(super) fn report_rivals(
+        &self,
+        found: &Found,
+        intervals: &[[Option<f64>; 2]],
+        rivals: &[Found],
+    ) -> Vec<Rival> {
+        let is_beyond = |rival: &&Found| {
+            let mut all = rival.solution.x.iter().zip(intervals);
+            all.any(|(value, [low, high])| {
+                low.is_some_and(|low| *value < low) || high.is_some_and(|high| *value > high)
+            })
+        };
+        let rivals = rivals.iter().filter(is_beyond);
+        rivals.map(|rival| self.report_rival(found, rival)).collect()
+    }
+
+    fn report_rival(&self, found: &Found, rival: &Found) -> Rival {
+        let data = self.problem.data;
+        let information = self.information(rival);
+        let parameters = self.problem.parameters.iter().enumerate();
+        let parameters = parameters.map(|(k, parameter)| RivalParameter {
+            key: parameter.name.clone(),
+            curve: parameter.curve.map(|curve| data.curves[curve].name.clone()),
+            value: rival.solution.x[k],
+            standard_error: information.errors[k],
+            unit: parameter.unit(data, self.problem.case),
+        });
+        let (decides, words) = self.decider(found, rival);
+        Rival {
+            parameters: parameters.collect(),
+            above_best: self.above(rival, found),
+            chi2: self.chi2(rival),
+            decides,
+            words,
+        }
+    }
+
+    /// The observable that decides between two fits, and a sentence about it.
+    fn decider(&self, found: &Found, rival: &Found) -> (Option<String>, String) {
+        let data = self.problem.data;
+        let names: Vec<&str> = data.columns.iter().map(|c| c.quantity.name()).collect();
+        let amplitude = names.iter().position(|name| *name == "first_harmonic");
+        let unit = self.problem.case.physical().map_or(1.0, |view| view.scales.length);
+        // Noise of a length, and of an angle at the amplitude of a row.
+        let noise = amplitude.map_or(0.0, |column| {
+            let rows = data.rows().map(|row| {
+                row.errors[column].unwrap_or(row.relative[column] * found.noise[column])
+            });
+            super::instrument::median(rows.collect())
+        });
+        let deciders = DECIDERS.iter().filter(|name| !names.contains(name));
+        let deciders: Vec<&'static Observable> = deciders
+            .filter_map(|name| OBSERVABLES.iter().find(|o| o.name == *name))
+            .collect();
+        let nothing = || {
+            (
+                None,
+                "no other column of these rows decides: rows nearer to the sample or another free \
+                 amplitude may"
+                    .to_owned(),
+            )
+        };
+        if !(noise > 0.0) {
+            return nothing();
+        }
+        let set = deciders.iter().fold(ObservableSet::FIRST_HARMONIC, |set, o| set.with(o));
+        let of = |point: &RowPoint| {
+            let (at, orbit) = (point.at.as_ref()?, point.orbit.as_ref().filter(|_| !point.lost)?);
+            measure(&at.1, orbit.states.first()?, orbit.period, set).ok()
+        };
+        let swept = &data.swept[0];
+        let rows = self.problem.rows();
+        let pairs = found.solution.point.iter().zip(rival.solution.point.iter());
+        let pairs: Vec<_> = pairs
+            .zip(&rows)
+            .filter_map(|((a, b), (curve, row))| {
+                let at = self.problem.place(&found.solution.x, *curve, row)[0];
+                Some((at, of(a)?, of(b)?))
+            })
+            .collect();
+        // Sum of the squared differences in standard errors, the largest difference, and its row.
+        let difference = |observable: &'static Observable| -> Option<(f64, f64, f64)> {
+            let is_angle = super::quantity::Quantity::Observed(observable).is_angle();
+            let mut most = (0.0, 0.0);
+            let mut squares = 0.0;
+            for (at, a, b) in &pairs {
+                let number = |of| (observable.of)(of).number();
+                let mut change = number(b)? - number(a)?;
+                let mut error = noise / unit;
+                if is_angle {
+                    change -= 360.0 * (change / 360.0).round();
+                    let swing = a.first_harmonic.min(b.first_harmonic);
+                    error = (error / swing).to_degrees();
+                }
+                squares += (change / error).powi(2);
+                if change.abs() > f64::abs(most.0) {
+                    most = (change, *at);
+                }
+            }
+            Some((squares.sqrt(), most.0, most.1))
+        };
+        let all = deciders.iter().filter_map(|o| Some((*o, difference(o)?)));
+        let best = all.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let Some((observable, (sum, most, at))) = best.filter(|(_, (sum, ..))| *sum > DECISIVE) else {
+            return nothing();
+        };
+        let is_angle = super::quantity::Quantity::Observed(observable).is_angle();
+        let size = if is_angle {
+            format!("{}°", shown(most))
+        } else if self.problem.case.is_physical() {
+            format!("{} nm", shown(1e9 * most * unit))
+        } else {
+            shown(most)
+        };
+        let place = if self.problem.case.is_physical() && super::data::is_distance(swept.key) {
+            format!("{} nm", shown(1e9 * at))
+        } else {
+            shown(at)
+        };
+        let name = match observable.name {
+            "first_harmonic" => "amplitude",
+            name => name,
+        };
+        (
+            Some(name.to_owned()),
+            format!(
+                "a column `{name}` decides: it differs by up to {size} (at {} = {place}), over all rows by \
+                 {:.0} standard errors as those of the data",
+                swept.key.path(),
+                sum
+            ),
+        )
+    }
+}
+
+/// Three significant digits.
+fn shown(value: f64) -> String {
+    let rounded = format!("{value:.2e}").parse().unwrap_or(value);
+    nanotap_quantity::number::shortest(rounded)
+}

@@ -12,7 +12,7 @@ use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{
     Estimate, FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve,
-    FittedParameter, MapFile, Table as MeasuredTable,
+    FittedParameter, MapFile, RivalParameter, Table as MeasuredTable,
 };
 use serde::Serialize;
 
@@ -475,6 +475,48 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
     }
     for undetermined in &report.undetermined {
         text.push_str(&motion::paragraph(&undetermined.words));
+    }
+    text.push_str(&rivals(report));
+    for suggestion in &report.suggestions {
+        text.push_str(&motion::paragraph(&format!(
+            "{}. Try --free {}",
+            suggestion.words,
+            suggestion.free.join(",")
+        )));
+    }
+    if !report.suggestions.is_empty() {
+        text.push_str(&motion::paragraph(
+            "A wrong law leaves such residuals, too: compare with others (--laws).",
+        ));
+    }
+    text
+}
+
+/// Other minima that describe the data about as well.
+fn rivals(report: &FitReport) -> String {
+    let mut text = String::new();
+    for rival in &report.rivals {
+        let of = |p: &RivalParameter| {
+            let value = with_unit(&p.key, &p.unit, p.value);
+            let name = match &p.curve {
+                Some(curve) => format!("{} of {curve}", p.key),
+                None => p.key.clone(),
+            };
+            match p.standard_error {
+                Some(error) => {
+                    let error = with_unit(&p.key, &p.unit, error);
+                    format!("{name} = {value} (standard error {error})")
+                }
+                None => format!("{name} not determined"),
+            }
+        };
+        let values: Vec<String> = rival.parameters.iter().map(of).collect();
+        text.push_str(&motion::paragraph(&format!(
+            "Another minimum describes the data about as well (Akaike's criterion {:+.1}): {}. {}.",
+            rival.above_best,
+            values.join(", "),
+            rival.words
+        )));
     }
     text
 }

@@ -97,8 +97,10 @@ options! {
         /// `phase (deg)`
         #[schemars(extend("x-own" = true))]
         pub data: Vec<Table> = Vec::new(),
-        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column;
-        /// default for a force curve: modulus, contact point, baseline, and the adhesion of the law
+        /// Parameters to find: keys of the case, gap.offset, NAME.offset or NAME.scale of a column, and
+        /// terms of the instrument: NAME.tilt, NAME.curvature, NAME.interference, NAME.drag, gap.drift,
+        /// gap.backlash; default for a force curve: modulus, contact point, baseline, and the adhesion of
+        /// the law
         #[schemars(extend("x-value" = "KEY,…"))]
         pub free: Vec<String> = Vec::new(),
         /// Parameters to find with one value per curve

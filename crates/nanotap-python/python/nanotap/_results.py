@@ -72,6 +72,7 @@ class Fit(Report):
             "bic",
             "above_best",
             "weight",
+            "rows_without_orbit",
             "chi2",
             "reason",
         ]
@@ -135,6 +136,9 @@ class Fit(Report):
             how = "estimated from the residuals" if column["estimated"] else "stated"
             size = _quantity(column["standard_error"], column["unit"])
             lines.append(f"  standard error of {column['name']}: {size} ({how})")
+        lines += [f"  rival minimum: {_rival(one)}" for one in self.get("rivals", ())]
+        for one in self.get("suggestions", ()):
+            lines.append(f"  {one['words']}: free={','.join(one['free'])!r}")
         names = list(self.best)
         table = self["correlations"]
         pairs_ = [
@@ -173,6 +177,14 @@ class Reconstruction(Report):
 def _of_curve(parameter: Mapping[str, Any]) -> str:
     key, curve = parameter["key"], parameter.get("curve")
     return str(key) if curve is None else f"{key} of {curve}"
+
+
+def _rival(rival: Mapping[str, Any]) -> str:
+    values = [
+        f"{_of_curve(p)} = {_quantity(p['value'], p['unit'])}"
+        for p in rival["parameters"]
+    ]
+    return f"{', '.join(values)}: {rival['words']}"
 
 
 def floats(value: Sequence[Any]) -> Floats:

@@ -27,6 +27,7 @@ mod blocks;
 mod branches;
 mod data;
 mod force_curve;
+mod effort;
 mod guess;
 mod implied_case;
 pub(crate) mod instrument;
@@ -67,6 +68,7 @@ pub use report::{
 
 pub use selection::Segment;
 
+use effort::Effort;
 use guess::begin_from_free_rows;
 use instrument::Channels;
 use parameters::{begin, correct, keep_physical, parameters, starts};
@@ -85,6 +87,8 @@ use nanotap_study::value::{Amount, Intervals};
 
 /// Largest number of initial values of a fit.
 const MAX_STARTS: usize = 1000;
+/// Largest number of evaluations of a curve.
+const MAX_EVALUATIONS: usize = 1_000_000;
 /// Name of the zero of the phase.
 const PHASE: &str = "phase.offset";
 /// Longest period of the orbits in drive periods.
@@ -171,6 +175,10 @@ options! {
         /// Search for other minima that describe the data about as well
         #[schemars(extend("x-no" = "Do not search for other minima"))]
         pub rivals: bool = true,
+        /// Evaluations of the whole curve after which the search ends with what is known; default: 60
+        /// under a nonlinear law, else no limit
+        #[schemars(range(min = 1, max = MAX_EVALUATIONS), extend("x-value" = "E"))]
+        pub evaluations: Option<usize> = None,
     }
 }
 
@@ -406,6 +414,8 @@ fn with_search<R>(
         .is_modulated()
         .then(|| Loop::of(&case, request.phase))
         .transpose()?;
+    let is_nonlinear = case.model().is_ok_and(|model| model.nonlinear.is_some());
+    let effort = Effort::new(request.evaluations, data.rows().count(), is_nonlinear);
     let search = Search {
         preparation: &preparation,
         problem: Problem {
@@ -417,6 +427,7 @@ fn with_search<R>(
             robust: None,
             jumps: Vec::new(),
             held,
+            effort: &effort,
         },
         request,
         control,

@@ -1,9 +1,10 @@
 //! 95 % intervals from the profile of the likelihood: where the least chi2 with one parameter fixed
 //! exceeds the least of all by the square of Student's (or the normal) quantile.
 
+use super::effort::Part;
 use super::problem::{Point, Problem};
 use super::solve::{
-    LeastSquares as _, Solution, minimise, moved, slope_kept, step_between, stepped,
+    LeastSquares as _, Solution, minimise_within, moved, slope_kept, step_between, stepped,
 };
 use super::statistics::Information;
 
@@ -11,6 +12,8 @@ use super::statistics::Information;
 const MAX_EVALUATIONS: usize = 6;
 /// Largest number of steps of the other parameters per evaluation.
 const MAX_STEPS: usize = 4;
+/// Largest number of steps of a fit of the other parameters.
+const MAX_MINIMISING: usize = 20;
 /// Smallest predicted gain of chi2 for which a step is taken.
 const MIN_GAIN: f64 = 1e-3;
 /// Accuracy of the quantile, in standard errors.
@@ -91,6 +94,9 @@ fn end(
     let mut outer: Option<(f64, f64)> = None;
     let mut t = width;
     for _ in 0..MAX_EVALUATIONS {
+        if problem.effort.ends(Part::Intervals) {
+            break;
+        }
         let value = at(t);
         if value < low || value > high {
             return End::None;
@@ -176,7 +182,7 @@ fn least(
     let bounds: Vec<(f64, f64)> = parameters
         .map(|(j, p)| if j == k { (held, held) } else { p.bounds })
         .collect();
-    let solution = minimise(problem, x, point, &bounds, MIN_GAIN)?;
+    let solution = minimise_within(problem, x, point, &bounds, MIN_GAIN, MAX_MINIMISING)?;
     (lost(&solution.point) <= most).then_some(ConstrainedMinimum {
         x: solution.x,
         point: solution.point,

@@ -119,7 +119,8 @@ impl Search<'_> {
         let p_value = given.then(|| self.probability(found));
         let columns = self.columns(found);
         let misfit = self.not_noise(found);
-        let (reason, remarks) = self.judge(found, p_value, &fitted, &columns, &misfit);
+        let (reason, mut remarks) = self.judge(found, p_value, &fitted, &columns, &misfit);
+        remarks.extend(self.problem.effort.words());
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
         let best = |case_of_curve: Case| case_of_curve.leaving_distance_as(case).to_toml();

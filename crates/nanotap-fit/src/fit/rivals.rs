@@ -12,6 +12,7 @@ use nalgebra::DVector;
 use nanotap_case::Key;
 use nanotap_observe::{OBSERVABLES, Observable, ObservableSet, measure};
 
+use super::effort::Part;
 use super::parameters::Target;
 use super::problem::RowPoint;
 use super::report::{Rival, RivalParameter};
@@ -25,6 +26,9 @@ const FACTOR: f64 = 8.0;
 /// Mean rough cost of a value, relative to that of the best fit and beyond it, up to which a start
 /// is followed to its minimum.
 const ROUGH_REACH: (f64, f64) = (1.5, 0.01);
+/// Largest number of rows of a curve in the rough fits, and rounds of these.
+const ROUGH_ROWS: usize = 20;
+const ROUNDS: usize = 3;
 /// Two minima are the same if the residuals change by less than this between them, to first order,
 /// in standard errors.
 const SAME: f64 = 1.0;
@@ -48,14 +52,15 @@ impl Search<'_> {
     pub(super) fn rivals(&self, best: Found, others: Vec<Found>) -> (Found, Vec<Found>) {
         let mut all = vec![best];
         all.extend(others);
-        let (_, cost) = self.rough(all[0].solution.x.clone());
+        let rough = |x: Vec<f64>| self.rough_within(x, ROUGH_ROWS, ROUNDS);
+        let (_, cost) = rough(all[0].solution.x.clone());
         let most = ROUGH_REACH.0 * cost + ROUGH_REACH.1;
         for start in self.starts_of_rivals(&all[0]) {
-            if self.control.is_cancelled() {
+            if self.control.is_cancelled() || self.problem.effort.ends(Part::Rivals) {
                 break;
             }
             let start = self.with_best_offset(&start).unwrap_or(start);
-            let (x, cost) = self.rough(start);
+            let (x, cost) = rough(start);
             if cost > most || all.iter().any(|known| self.is_same(known, &x)) {
                 continue;
             }
@@ -87,22 +92,26 @@ impl Search<'_> {
     /// Initial values for the search: attraction and stiffness changed by a factor.
     fn starts_of_rivals(&self, best: &Found) -> Vec<Vec<f64>> {
         let mut starts = Vec::new();
-        for keys in [&ATTRACTIONS, &STIFFNESSES] {
-            for factor in [FACTOR, FACTOR.recip()] {
-                let mut start = best.solution.x.clone();
-                for (k, parameter) in self.problem.parameters.iter().enumerate() {
-                    let Target::Key(key) = parameter.target else {
-                        continue;
-                    };
-                    if keys.contains(&key) {
-                        let (low, high) = parameter.bounds;
-                        let of = if start[k] == 0.0 { parameter.start } else { start[k] };
-                        start[k] = (factor * of).clamp(low, high);
-                    }
+        let has = |keys: &[Key]| {
+            let mut all = self.problem.parameters.iter();
+            all.any(|p| keys.iter().any(|key| p.target == Target::Key(*key)))
+        };
+        // An attraction decides which branch the data may be on; each start costs a fit.
+        let keys = if has(&ATTRACTIONS) { &ATTRACTIONS } else { &STIFFNESSES };
+        for factor in [FACTOR, FACTOR.recip()] {
+            let mut start = best.solution.x.clone();
+            for (k, parameter) in self.problem.parameters.iter().enumerate() {
+                let Target::Key(key) = parameter.target else {
+                    continue;
+                };
+                if keys.contains(&key) {
+                    let (low, high) = parameter.bounds;
+                    let of = if start[k] == 0.0 { parameter.start } else { start[k] };
+                    start[k] = (factor * of).clamp(low, high);
                 }
-                if start != best.solution.x {
-                    starts.push(start);
-                }
+            }
+            if start != best.solution.x {
+                starts.push(start);
             }
         }
         starts
@@ -182,7 +191,7 @@ impl Search<'_> {
         let nothing = || {
             (
                 None,
-                "no other column of these rows decides: rows nearer to the sample or another free \
+                "No other column of these rows decides: rows nearer to the sample or another free \
                  amplitude may"
                     .to_owned(),
             )
@@ -220,8 +229,8 @@ impl Search<'_> {
                     error = (error / swing).to_degrees();
                 }
                 squares += (change / error).powi(2);
-                if change.abs() > f64::abs(most.0) {
-                    most = (change, *at);
+                if change.abs() > most.0 {
+                    most = (change.abs(), *at);
                 }
             }
             Some((squares.sqrt(), most.0, most.1))
@@ -251,7 +260,7 @@ impl Search<'_> {
         (
             Some(name.to_owned()),
             format!(
-                "a column `{name}` decides: it differs by up to {size} (at {} = {place}), over all rows by \
+                "A column `{name}` decides: it differs by up to {size} (at {} = {place}), over all rows by \
                  {:.0} standard errors as those of the data",
                 swept.key.path(),
                 sum

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use super::FitOptions;
 use super::branches::Rows;
 use super::data::Data;
+use super::effort::Part;
 use super::jumps::Jump;
 use super::problem::{MAX_RINGING, Point, Problem};
 use super::report::FitReport;
@@ -69,7 +70,7 @@ impl<'a> Search<'a> {
         let mut least_rough = 0.0;
         let mut tried = 0;
         for start in &starts {
-            if self.control.is_cancelled() {
+            if self.control.is_cancelled() || tried > 0 && self.problem.effort.ends(Part::Starts) {
                 break;
             }
             let scanned = (tried >= first).then(|| self.with_best_offset(start));
@@ -193,15 +194,25 @@ impl<'a> Search<'a> {
 
     /// Fits from initial values until branches and parameters are approximately right, and returns
     /// the mean cost of a value; infinite without a fit.
-    pub(super) fn rough(&self, mut x: Vec<f64>) -> (Vec<f64>, f64) {
+    fn rough(&self, x: Vec<f64>) -> (Vec<f64>, f64) {
+        self.rough_within(x, MAX_ROUGH_ROWS, MAX_ROUNDS)
+    }
+
+    /// The same with at most so many rows of a curve, and so many assignments of branches.
+    pub(super) fn rough_within(
+        &self,
+        mut x: Vec<f64>,
+        rows: usize,
+        rounds: usize,
+    ) -> (Vec<f64>, f64) {
         let mut mean = f64::INFINITY;
         let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
         // Given errors are much smaller; they are used in the end, as are all rows.
-        let plain = rough_data(problem.data);
+        let plain = rough_data(problem.data, rows);
         problem.data = &plain;
         let mut before: Option<Vec<usize>> = None;
         let mut known: Option<Vec<Rows>> = None;
-        for _ in 0..MAX_ROUNDS {
+        for _ in 0..rounds {
             if self.control.is_cancelled() {
                 break;
             }
@@ -450,11 +461,11 @@ pub(super) fn branches_of(point: &Point) -> Vec<usize> {
     point.iter().map(|row| row.branch).collect()
 }
 
-/// The data without their errors, and of a long curve every n-th row.
-fn rough_data(data: &Data) -> Data {
+/// The data without their errors, and of a curve of more than `rows` every n-th row.
+fn rough_data(data: &Data, rows: usize) -> Data {
     let mut rough = data.clone();
     for curve in &mut rough.curves {
-        let stride = curve.rows.len().div_ceil(MAX_ROUGH_ROWS).max(1);
+        let stride = curve.rows.len().div_ceil(rows).max(1);
         curve.rows = curve.rows.iter().step_by(stride).cloned().collect();
         for row in &mut curve.rows {
             row.errors.iter_mut().for_each(|error| *error = None);

@@ -94,9 +94,21 @@ pub(super) fn slope_kept(from: f64, x: f64, low: f64) -> f64 {
 pub(super) fn minimise<L: LeastSquares>(
     problem: &L,
     x: Vec<f64>,
+    point: L::Point,
+    bounds: &[(f64, f64)],
+    enough: f64,
+) -> Option<Solution<L::Point>> {
+    minimise_within(problem, x, point, bounds, enough, MAX_STEPS)
+}
+
+/// The same in at most so many steps, accepted or rejected.
+pub(super) fn minimise_within<L: LeastSquares>(
+    problem: &L,
+    x: Vec<f64>,
     mut point: L::Point,
     bounds: &[(f64, f64)],
     enough: f64,
+    steps: usize,
 ) -> Option<Solution<L::Point>> {
     let residuals = problem.residuals(&x, &point);
     let jacobian = problem.jacobian(&x, &mut point)?;
@@ -108,9 +120,9 @@ pub(super) fn minimise<L: LeastSquares>(
         jacobian,
         iterations: 0,
     };
-    let found = descend(problem, start, bounds, enough);
+    let found = descend(problem, start, bounds, enough, steps);
     Some(match without_nothing(problem, &found, bounds) {
-        Some(bare) => descend(problem, bare, bounds, enough),
+        Some(bare) => descend(problem, bare, bounds, enough, steps),
         None => found,
     })
 }
@@ -155,6 +167,7 @@ fn descend<L: LeastSquares>(
     from: Solution<L::Point>,
     bounds: &[(f64, f64)],
     enough: f64,
+    steps: usize,
 ) -> Solution<L::Point> {
     let Solution {
         mut x,
@@ -167,7 +180,7 @@ fn descend<L: LeastSquares>(
     let count = x.len();
     let mut scale = DVector::from_element(count, 0.0);
     let (mut damping, mut growth) = (1e-3, 2.0);
-    for _ in 0..MAX_STEPS {
+    for _ in 0..steps {
         let cost = residuals.norm_squared();
         // Units in which a step is one of the logarithm.
         let unit = |j: usize| {

@@ -19,6 +19,7 @@ use crate::fit::branches::{
     Candidate, RowCases, Rows, newton_continuation, path, release_branch_ends,
 };
 use crate::fit::data::{Column, Data, Row};
+use crate::fit::effort::Effort;
 use crate::fit::jumps::{Fold, Jump};
 use crate::fit::parameters::{Parameter, Target};
 use crate::fit::solve::LeastSquares;
@@ -46,6 +47,7 @@ pub(super) struct Problem<'a> {
     pub(super) jumps: Vec<Jump>,
     /// Settings of a loop of frequency modulation.
     pub(super) held: Option<Loop>,
+    pub(super) effort: &'a Effort,
 }
 
 /// Keys of the case, each with its derivative by a parameter.
@@ -269,6 +271,7 @@ impl Problem<'_> {
     ) -> Option<RowPoint> {
         let (case, model) = &*at;
         let start = orbit.states.first()?;
+        self.effort.add_orbit();
         let observables = measure(model, start, orbit.period, self.set()).ok()?;
         let si = match case.physical() {
             Some(view) => observables.in_si(&view.scales),

@@ -292,10 +292,29 @@ impl<'a> Search<'a> {
                 steps,
             });
             if settled && same {
-                break;
+                return found;
             }
             noise = after;
         }
+        // Noise that has not settled is that of the last residuals.
+        found.map(|found| self.with_noise(found, noise))
+    }
+
+    /// The same fit with other standard errors of the columns that give none.
+    fn with_noise(&self, mut found: Found, noise: Vec<f64>) -> Found {
+        let columns = noise.len();
+        for (row, of) in self.problem.data.rows().enumerate() {
+            for (column, new) in noise.iter().enumerate() {
+                if of.errors[column].is_none() {
+                    let factor = found.noise[column] / new;
+                    let at = row * columns + column;
+                    found.solution.residuals[at] *= factor;
+                    found.solution.jacobian.row_mut(at).scale_mut(factor);
+                }
+            }
+        }
+        found.solution.cost = found.solution.residuals.norm_squared();
+        found.noise = noise;
         found
     }
 

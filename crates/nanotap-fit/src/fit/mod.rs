@@ -401,7 +401,6 @@ fn with_search<R>(
     }
     data.add_free_scatter();
     preparation.extend(data.average(request.rows));
-    data.measure_ramp();
     if data.is_force_curve() {
         preparation.extend(baseline::assumptions(&case, &data)?);
     }

@@ -119,7 +119,7 @@ impl Search<'_> {
         let p_value = given.then(|| self.probability(found));
         let columns = self.columns(found);
         let misfit = self.not_noise(found);
-        let (reason, mut remarks) = self.judge(found, p_value, &fitted, &columns, &misfit);
+        let (reason, mut remarks) = self.judge(found, p_value, &fitted, &misfit);
         remarks.extend(self.problem.effort.words());
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
@@ -597,13 +597,21 @@ impl Search<'_> {
         )
     }
 
+    /// Whether the residuals are as large as the variation of the data.
+    pub(super) fn is_nothing(&self, found: &Found) -> bool {
+        let fitted = self.columns(found);
+        let columns = fitted.iter().zip(&self.problem.data.columns);
+        columns
+            .into_iter()
+            .all(|(fitted, column)| fitted.residual > 0.5 * column.spread)
+    }
+
     /// Determines why the model does not describe the data, and adds other warnings.
     fn judge(
         &self,
         found: &Found,
         p_value: Option<f64>,
         parameters: &[FittedParameter],
-        columns: &[FittedColumn],
         misfit: &[String],
     ) -> (Option<String>, Vec<String>) {
         let data = self.problem.data;
@@ -653,10 +661,6 @@ impl Search<'_> {
                 self.freedom(found)
             )
         });
-        let nothing = columns
-            .iter()
-            .zip(&data.columns)
-            .all(|(fitted, column)| fitted.residual > 0.5 * column.spread);
         let reason = if 2 * lost > point.len() {
             let motion = if data.is_force_curve() {
                 "rest"
@@ -664,7 +668,7 @@ impl Search<'_> {
                 "periodic orbit"
             };
             Some(format!("more than half of the rows have no {motion}"))
-        } else if nothing {
+        } else if self.is_nothing(found) {
             Some("the residuals are as large as the variation of the data".to_owned())
         } else {
             unlikely

@@ -21,7 +21,7 @@ use super::terms::{PERIODS, Term, periods};
 
 /// Least fall of Akaike's criterion that is reported: noise reaches it with one of the candidates in
 /// less than one of 200 fits.
-const MIN_FALL: f64 = 10.0;
+const MIN_FALL: f64 = 14.0;
 /// Largest number of suggestions.
 const MAX_SUGGESTIONS: usize = 3;
 /// Part of a column that the free parameters must leave, so that it is not one of them.
@@ -58,6 +58,11 @@ struct Effect {
 impl Search<'_> {
     /// Corrections that the residuals of a fit show, the clearest first.
     pub(super) fn suggestions(&self, found: &Found) -> Vec<Suggestion> {
+        // To first order nothing follows from a fit that has not found the curve.
+        let lost = found.solution.point.iter().filter(|row| row.lost).count();
+        if self.is_nothing(found) || 2 * lost > found.solution.point.len() {
+            return Vec::new();
+        }
         let problem = self.problem_of(found);
         let Some(candidates) = self.candidates(&problem, found) else {
             return Vec::new();
@@ -72,7 +77,8 @@ impl Search<'_> {
         let mut basis = range(&found.solution.jacobian);
         let mut suggested: Vec<Suggestion> = Vec::new();
         while suggested.len() < MAX_SUGGESTIONS {
-            let effects = candidates.iter().filter_map(|candidate| {
+            let is_new = |of: &&Candidate| suggested.iter().all(|known| known.key != of.key);
+            let effects = candidates.iter().filter(is_new).filter_map(|candidate| {
                 let effect = self.effect(found, candidate, &residuals, &basis)?;
                 Some((candidate, effect))
             });

@@ -91,6 +91,20 @@ pub(crate) struct Ramp {
     side: f64,
 }
 
+impl Ramp {
+    /// The mean of some rows in one direction.
+    pub(crate) fn mean(rows: &[Row]) -> Self {
+        let mean = |of: fn(&Self) -> f64| {
+            rows.iter().map(|row| of(&row.ramp)).sum::<f64>() / rows.len() as f64
+        };
+        Self {
+            depth: mean(|ramp| ramp.depth),
+            elapsed: mean(|ramp| ramp.elapsed),
+            side: mean(|ramp| ramp.side),
+        }
+    }
+}
+
 impl Term {
     pub(super) fn named(name: &str) -> Option<Self> {
         let named = NAMES.iter().find(|(of, _)| *of == name);

@@ -14,6 +14,7 @@ use super::baseline::baseline_rows;
 use super::data::{Column, Curve, Data, Row, is_distance};
 use super::instrument::{far_and_doubtful_rows, median, wrapped};
 use super::statistics::span;
+use super::terms::Ramp;
 
 /// Scatter of the values of a column about smooth curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -493,6 +494,7 @@ impl Bin {
         let rows = &rows[self.range.clone()];
         let mut row = rows[0].clone();
         row.at[0] = self.distance;
+        row.ramp = Ramp::mean(rows);
         // The scatter of averages is known from their own rows.
         row.is_free = false;
         for (column, fits) in self.fits.iter().enumerate() {

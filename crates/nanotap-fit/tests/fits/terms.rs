@@ -11,9 +11,9 @@ use nanotap_study::Study as _;
 
 /// A soft lever over a soft sample under Hertz's law.
 const LEVER: &str = "modes = 3\n[cantilever]\nk = \"0.5 N/m\"\nf0 = \"25 kHz\"\nQ = 10\n[tip]\n\
-     radius = \"20 nm\"\n[sample]\nlaw = \"hertz\"\nmodulus = \"20 MPa\"\n[drive]\n\
-     frequency = \"25 kHz\"\nfree_amplitude = \"0 nm\"\n[gap]\ntip = \"1500 nm\"\n";
-const MODULUS: f64 = 20e6;
+     radius = \"20 nm\"\n[sample]\nlaw = \"hertz\"\nmodulus = \"200 MPa\"\n[drive]\n\
+     frequency = \"25 kHz\"\nfree_amplitude = \"0 nm\"\n[gap]\ntip = \"1000 nm\"\n";
+const MODULUS: f64 = 200e6;
 /// Compliance of the modes beyond the third, m/N: 1/k less the sum of 12/(β⁴ k) with β = 1.8751041,
 /// 4.6940911 and 7.8547574. A real lever has it, the moving one of the study does not.
 const OMITTED: f64 = 1.4437e-3 / 0.5;
@@ -23,7 +23,7 @@ const NOISE: f64 = 0.1;
 /// Distance and deflection (nm) of a force curve, and its directions.
 fn force_curve() -> (Vec<[f64; 2]>, Vec<Way>) {
     let options = ForceCurveOptions {
-        to: Some("-60 nm".into()),
+        to: Some("-200 nm".into()),
         speed: Some("2 um/s".into()),
         points: 400,
         ..ForceCurveOptions::default()
@@ -66,15 +66,15 @@ const EXAMPLES: [Example; 7] = [
     },
     Example {
         free: &["deflection.curvature"],
-        truths: &[3e3],
+        truths: &[1e4],
         suggested: "deflection.curvature",
         bias: 0.02,
     },
     Example {
         free: &["deflection.interference"],
-        truths: &[1.5e-9, -1e-9, 330e-9],
+        truths: &[3e-9, -2e-9, 330e-9],
         suggested: "deflection.interference",
-        bias: 0.02,
+        bias: 0.5,
     },
     Example {
         free: &["deflection.drag"],
@@ -84,7 +84,7 @@ const EXAMPLES: [Example; 7] = [
     },
     Example {
         free: &["gap.drift"],
-        truths: &[8e-9],
+        truths: &[20e-9],
         suggested: "gap.drift",
         bias: 0.0,
     },
@@ -96,9 +96,9 @@ const EXAMPLES: [Example; 7] = [
     },
     Example {
         free: &["deflection.scale"],
-        truths: &[1.15],
+        truths: &[1.05],
         suggested: "deflection.scale",
-        bias: 0.05,
+        bias: 0.5,
     },
 ];
 
@@ -149,7 +149,7 @@ fn recorded(example: Option<&Example>, seed: u64) -> Table {
 const FREE: [&str; 3] = ["sample.modulus", "gap.offset", "deflection.offset"];
 
 fn start() -> Case {
-    case(LEVER, &["sample.modulus=5 MPa"])
+    case(LEVER, &["sample.modulus=50 MPa"])
 }
 
 #[test]
@@ -169,15 +169,15 @@ fn each_term_is_found_suggested_and_needed() {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         assert_eq!(&names[..3], &FREE);
         let with = fitted(&start(), &options(table, &names));
-        assert!(with.fits && !with.misfit, "{:?}", with.remarks);
+        assert!(with.fits, "{:?}", with.reason);
         assert!(with.suggestions.is_empty(), "{:?}", with.suggestions);
         for (p, truth) in with.parameters[3..].iter().zip(example.truths) {
             assert!(off(&with, &p.key, *truth) < 4.0, "{p:?} {truth}");
         }
         assert!(off(&with, "sample.modulus", MODULUS) < 4.0, "{with:?}");
         let bias = (parameter(&without, "sample.modulus").value / MODULUS - 1.0).abs();
-        let biased = bias > example.bias && (example.bias == 0.0 || bias > 0.0);
-        assert!(biased || without.misfit, "{} {bias}", example.suggested);
+        assert!(bias >= example.bias, "{} {bias}", example.suggested);
+        assert!(without.misfit, "{}", example.suggested);
     }
 }
 
@@ -207,8 +207,8 @@ fn derivatives_by_terms_are_exact() {
         rows: 40,
         ..options(table, &names)
     };
-    let x = [20e6, 1e-3, 2e3, 1e-9, -2e-9, 340e-9, 1e-9, 5e-9, 3e-9, 1.1];
-    let steps = [2e3, 1e-7, 1.0, 1e-13, 1e-13, 1e-12, 1e-13, 1e-13, 1e-13, 1e-6];
+    let x = [200e6, 1e-3, 2e3, 1e-9, -2e-9, 340e-9, 1e-9, 5e-9, 3e-9, 1.1];
+    let steps = [2e4, 1e-7, 1.0, 1e-13, 1e-13, 1e-12, 1e-13, 1e-13, 1e-13, 1e-6];
     let at = |x: &[f64]| residuals(&start(), &request, x, &Control::default()).unwrap();
     let exact = at(&x).jacobian;
     for (k, step) in steps.iter().enumerate() {

@@ -28,11 +28,12 @@ fn record(with_phase: bool) -> Table {
     table(columns, &ways)
 }
 
-fn found(with_phase: bool) -> FitReport {
+fn found(with_phase: bool, evaluations: Option<usize>) -> FitReport {
     let free = ["sample.modulus", "sample.hamaker", "gap.offset"];
     let request = FitOptions {
         profile: true,
         rivals: true,
+        evaluations,
         ..options(record(with_phase), &free)
     };
     let start = case(LEVER, &["sample.modulus=0.5 GPa", "sample.hamaker=1e-20 J"]);
@@ -43,7 +44,7 @@ fn found(with_phase: bool) -> FitReport {
 fn an_amplitude_alone_has_two_minima_and_the_phase_decides() {
     // An attractive motion over 30 zJ, and a repulsive one over a tenth of it, have amplitudes that
     // differ by less than the noise; their phases are on either side of 90°.
-    let report = found(false);
+    let report = found(false, Some(1000));
     assert!(report.fits, "{:?}", report.reason);
     let rival = report.rivals.first().expect("a rival");
     let other = rival.parameters.iter().find(|p| p.key == "sample.hamaker");
@@ -51,9 +52,21 @@ fn an_amplitude_alone_has_two_minima_and_the_phase_decides() {
     both.sort_by(f64::total_cmp);
     assert!(both[0] < 6e-21 && (2.2e-20..3.8e-20).contains(&both[1]), "{both:?}");
     assert_eq!(rival.decides.as_deref(), Some("phase"), "{}", rival.words);
-    let report = found(true);
+    let report = found(true, Some(1000));
     assert!(report.rivals.is_empty(), "{:?}", report.rivals);
     let hamaker = parameter(&report, "sample.hamaker");
     let error = hamaker.standard_error.unwrap();
     assert!((hamaker.value - 3e-20).abs() < 4.0 * error, "{hamaker:?}");
+}
+
+#[test]
+fn a_search_that_ends_early_says_so() {
+    let report = found(false, Some(1));
+    let said = |text: &str| report.remarks.iter().any(|remark| remark.contains(text));
+    assert!(said("other minima") && said("intervals") && said("evaluations"), "{:?}", report.remarks);
+    // The intervals are those of the standard errors.
+    let offset = parameter(&report, "gap.offset");
+    let half = 2.1 * offset.standard_error.unwrap();
+    let [low, high] = offset.interval.map(|end| end.unwrap());
+    assert!(high - low < 2.0 * half && low < offset.value && offset.value < high, "{offset:?}");
 }

@@ -10,7 +10,7 @@ use nanotap_scan::force_curve::{ForceCurveOptions, ForceCurveStudy};
 use nanotap_study::Study as _;
 
 /// A soft lever over a soft sample under Hertz's law.
-const LEVER: &str = "modes = 3\n[cantilever]\nk = \"0.5 N/m\"\nf0 = \"25 kHz\"\nQ = 10\n[tip]\n\
+const LEVER: &str = "[model]\nmodes = 3\n[cantilever]\nk = \"0.5 N/m\"\nf0 = \"25 kHz\"\nQ = 10\n[tip]\n\
      radius = \"20 nm\"\n[sample]\nlaw = \"hertz\"\nmodulus = \"200 MPa\"\n[drive]\n\
      frequency = \"25 kHz\"\nfree_amplitude = \"0 nm\"\n[gap]\ntip = \"1000 nm\"\n";
 const MODULUS: f64 = 200e6;

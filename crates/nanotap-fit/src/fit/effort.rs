@@ -57,7 +57,9 @@ impl Effort {
     /// Says what was left out.
     pub(super) fn words(&self) -> Option<String> {
         let bits = self.left_out.load(Ordering::Relaxed);
-        let parts = PARTS.iter().filter(|(part, _)| bits >> *part as u8 & 1 == 1);
+        let parts = PARTS
+            .iter()
+            .filter(|(part, _)| bits >> *part as u8 & 1 == 1);
         let parts: Vec<&str> = parts.map(|(_, words)| *words).collect();
         (!parts.is_empty()).then(|| {
             format!(

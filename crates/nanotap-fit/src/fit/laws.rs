@@ -81,7 +81,10 @@ pub(super) fn compare(
     }
     // The criteria of different rows cannot be compared.
     let rows = common_rows(&found);
-    for report in found.iter_mut().filter_map(|(_, fitted)| fitted.as_mut().ok()) {
+    for report in found
+        .iter_mut()
+        .filter_map(|(_, fitted)| fitted.as_mut().ok())
+    {
         if is_judged(report) {
             [report.aic, report.bic] = report.likelihood.criteria(&rows);
         }
@@ -103,7 +106,9 @@ pub(super) fn compare(
     let mut report = report?;
     report.remarks.extend(cautions(&law, &compared));
     let count = report.likelihood.rows.len();
-    report.remarks.extend(lost_rows(&compared, rows.len(), count));
+    report
+        .remarks
+        .extend(lost_rows(&compared, rows.len(), count));
     report.law = Some(law);
     report.laws = compared;
     report.cancelled |= control.is_cancelled();
@@ -145,7 +150,9 @@ fn is_judged(report: &FitReport) -> bool {
 /// The rows that have an orbit under every law that is judged.
 fn common_rows(found: &[(String, Result<FitReport, Error>)]) -> BTreeSet<(String, u64)> {
     let reports = found.iter().filter_map(|(_, fitted)| fitted.as_ref().ok());
-    let rows = reports.filter(|report| is_judged(report)).map(|report| report.likelihood.with_orbit());
+    let rows = reports
+        .filter(|report| is_judged(report))
+        .map(|report| report.likelihood.with_orbit());
     rows.reduce(|a, b| &a & &b).unwrap_or_default()
 }
 
@@ -168,7 +175,9 @@ fn lost_rows(laws: &[ComparedLaw], common: usize, all: usize) -> Option<String> 
 fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
     let judged = || {
         let reports = found.iter().filter_map(|(_, fitted)| fitted.as_ref().ok());
-        reports.filter(|report| is_judged(report)).map(|report| report.aic)
+        reports
+            .filter(|report| is_judged(report))
+            .map(|report| report.aic)
     };
     let least = judged().fold(f64::INFINITY, f64::min);
     let likelihood = |aic: f64| nanotap_arithmetic::exp(0.5 * (least - aic));

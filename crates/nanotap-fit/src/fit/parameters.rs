@@ -71,7 +71,6 @@ impl Parameter {
     pub(super) fn is_of(&self, curve: usize) -> bool {
         self.curve.is_none_or(|own| own == curve)
     }
-
 }
 
 /// Unit of a target in SI, `1` if there is none.
@@ -465,7 +464,10 @@ pub(super) fn correct(
 ) -> Result<Vec<String>, Error> {
     let mut notes = Vec::new();
     let mut fixed = Vec::new();
-    let is_scale = |name: &str| name.ends_with(".scale");
+    let is_scale = |name: &str| {
+        name.rsplit_once('.')
+            .is_some_and(|(_, what)| what == "scale")
+    };
     let given = || starts.iter().filter(|(name, _)| !is_free(name));
     // A reading is the scaled value with its offset and terms: these are taken off first.
     let first = given().filter(|(name, _)| !is_scale(name));

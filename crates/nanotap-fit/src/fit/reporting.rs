@@ -60,11 +60,16 @@ impl Search<'_> {
     pub(super) fn likelihood(&self, found: &Found) -> Likelihood {
         let data = self.problem.data;
         let x = &found.solution.x;
-        let rows = self.problem.rows().into_iter().zip(found.solution.point.iter());
+        let rows = self
+            .problem
+            .rows()
+            .into_iter()
+            .zip(found.solution.point.iter());
         let row = |((curve, row), point): ((usize, &Row), &RowPoint)| {
             let known = (0..data.columns.len()).filter(|column| row.values[*column].is_some());
             let deviance = known.clone().map(|column| {
-                let error = row.errors[column].unwrap_or(row.relative[column] * found.noise[column]);
+                let error =
+                    row.errors[column].unwrap_or(row.relative[column] * found.noise[column]);
                 let value = point.values[column];
                 let difference = self.problem.difference(x, curve, row, column, value);
                 let residual = if point.lost {
@@ -748,7 +753,10 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
                 let Some(values) = values else { continue };
                 let columns = data.columns.iter().zip(values).enumerate();
                 let readings = columns.map(|(index, (column, value))| {
-                    (column.name.clone(), problem.read(x, curve, measured, index, value))
+                    (
+                        column.name.clone(),
+                        problem.read(x, curve, measured, index, value),
+                    )
                 });
                 others.push(OtherOrbit {
                     curve: data.curves[curve].name.clone(),

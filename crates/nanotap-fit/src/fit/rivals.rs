@@ -37,7 +37,12 @@ const MAX_LOST: f64 = 0.1;
 /// Difference of an observable over all rows, in standard errors, that decides.
 const DECISIVE: f64 = 6.0;
 /// Observables that might decide, as a lock-in amplifier or a recorder measures them.
-const DECIDERS: [&str; 4] = ["phase", "first_harmonic", "mean_deflection", "second_harmonic"];
+const DECIDERS: [&str; 4] = [
+    "phase",
+    "first_harmonic",
+    "mean_deflection",
+    "second_harmonic",
+];
 
 const ATTRACTIONS: [Key; 3] = [
     Key::SampleHamaker,
@@ -61,7 +66,7 @@ impl Search<'_> {
             }
             let start = self.with_best_offset(&start).unwrap_or(start);
             let (x, cost) = rough(start);
-            if cost > most || all.iter().any(|known| self.is_same(known, &x)) {
+            if cost > most || all.iter().any(|known| is_same(known, &x)) {
                 continue;
             }
             all.extend(self.fine(x));
@@ -78,7 +83,7 @@ impl Search<'_> {
         for other in all {
             let known = rivals.iter().chain([&best]);
             let is_new = known.into_iter().all(|known| {
-                !(self.is_same(known, &other.solution.x) || self.is_same(&other, &known.solution.x))
+                !(is_same(known, &other.solution.x) || is_same(&other, &known.solution.x))
             });
             let lost = other.solution.point.iter().filter(|row| row.lost).count() as f64;
             let few = lost <= MAX_LOST * other.solution.point.len() as f64;
@@ -97,7 +102,11 @@ impl Search<'_> {
             all.any(|p| keys.iter().any(|key| p.target == Target::Key(*key)))
         };
         // An attraction decides which branch the data may be on; each start costs a fit.
-        let keys = if has(&ATTRACTIONS) { &ATTRACTIONS } else { &STIFFNESSES };
+        let keys = if has(&ATTRACTIONS) {
+            &ATTRACTIONS
+        } else {
+            &STIFFNESSES
+        };
         for factor in [FACTOR, FACTOR.recip()] {
             let mut start = best.solution.x.clone();
             for (k, parameter) in self.problem.parameters.iter().enumerate() {
@@ -106,7 +115,11 @@ impl Search<'_> {
                 };
                 if keys.contains(&key) {
                     let (low, high) = parameter.bounds;
-                    let of = if start[k] == 0.0 { parameter.start } else { start[k] };
+                    let of = if start[k] == 0.0 {
+                        parameter.start
+                    } else {
+                        start[k]
+                    };
                     start[k] = (factor * of).clamp(low, high);
                 }
             }
@@ -115,12 +128,6 @@ impl Search<'_> {
             }
         }
         starts
-    }
-
-    /// Whether values lie at a minimum, to first order in its residuals.
-    fn is_same(&self, found: &Found, x: &[f64]) -> bool {
-        let change = DVector::from_fn(x.len(), |k, _| x[k] - found.solution.x[k]);
-        (&found.solution.jacobian * change).norm() < SAME
     }
 
     /// By how much Akaike's criterion of one fit is above that of another, over the rows where both
@@ -147,7 +154,9 @@ impl Search<'_> {
             })
         };
         let rivals = rivals.iter().filter(is_beyond);
-        rivals.map(|rival| self.report_rival(found, rival)).collect()
+        rivals
+            .map(|rival| self.report_rival(found, rival))
+            .collect()
     }
 
     fn report_rival(&self, found: &Found, rival: &Found) -> Rival {
@@ -176,7 +185,11 @@ impl Search<'_> {
         let data = self.problem.data;
         let names: Vec<&str> = data.columns.iter().map(|c| c.quantity.name()).collect();
         let amplitude = names.iter().position(|name| *name == "first_harmonic");
-        let unit = self.problem.case.physical().map_or(1.0, |view| view.scales.length);
+        let unit = self
+            .problem
+            .case
+            .physical()
+            .map_or(1.0, |view| view.scales.length);
         // Noise of a length, and of an angle at the amplitude of a row.
         let noise = amplitude.map_or(0.0, |column| {
             let rows = data.rows().map(|row| {
@@ -196,12 +209,17 @@ impl Search<'_> {
                     .to_owned(),
             )
         };
-        if !(noise > 0.0) {
+        if noise.is_nan() || noise <= 0.0 {
             return nothing();
         }
-        let set = deciders.iter().fold(ObservableSet::FIRST_HARMONIC, |set, o| set.with(o));
+        let set = deciders
+            .iter()
+            .fold(ObservableSet::FIRST_HARMONIC, |set, o| set.with(o));
         let of = |point: &RowPoint| {
-            let (at, orbit) = (point.at.as_ref()?, point.orbit.as_ref().filter(|_| !point.lost)?);
+            let (at, orbit) = (
+                point.at.as_ref()?,
+                point.orbit.as_ref().filter(|_| !point.lost)?,
+            );
             measure(&at.1, orbit.states.first()?, orbit.period, set).ok()
         };
         let swept = &data.swept[0];
@@ -237,7 +255,8 @@ impl Search<'_> {
         };
         let all = deciders.iter().filter_map(|o| Some((*o, difference(o)?)));
         let best = all.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        let Some((observable, (sum, most, at))) = best.filter(|(_, (sum, ..))| *sum > DECISIVE) else {
+        let Some((observable, (sum, most, at))) = best.filter(|(_, (sum, ..))| *sum > DECISIVE)
+        else {
             return nothing();
         };
         let is_angle = super::quantity::Quantity::Observed(observable).is_angle();
@@ -267,6 +286,12 @@ impl Search<'_> {
             ),
         )
     }
+}
+
+/// Whether values lie at a minimum, to first order in its residuals.
+fn is_same(found: &Found, x: &[f64]) -> bool {
+    let change = DVector::from_fn(x.len(), |k, _| x[k] - found.solution.x[k]);
+    (&found.solution.jacobian * change).norm() < SAME
 }
 
 /// Three significant digits.

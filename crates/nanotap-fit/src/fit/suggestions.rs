@@ -83,7 +83,8 @@ impl Search<'_> {
                 Some((candidate, effect))
             });
             let best = effects.max_by(|a, b| a.1.fall.total_cmp(&b.1.fall));
-            let Some((candidate, effect)) = best.filter(|(_, effect)| effect.fall > MIN_FALL) else {
+            let Some((candidate, effect)) = best.filter(|(_, effect)| effect.fall > MIN_FALL)
+            else {
                 break;
             };
             let free = self.request.free.iter().cloned();
@@ -158,24 +159,13 @@ impl Search<'_> {
     }
 
     /// Interference in a column, one candidate per period.
-    fn interference(
-        &self,
-        problem: &Problem<'_>,
-        found: &Found,
-        column: usize,
-    ) -> Vec<Candidate> {
+    fn interference(&self, problem: &Problem<'_>, found: &Found, column: usize) -> Vec<Candidate> {
         let data = self.problem.data;
         let name = format!("{}.interference", data.columns[column].name);
         let target = Target::Term(Term::Sine, column);
         let is_free = self.problem.parameters.iter().any(|p| p.target == target);
         let of = data.columns[column].name.as_str();
-        let possible = nuisance(
-            self.problem.case,
-            data,
-            &name,
-            of,
-            "interference_sine",
-        );
+        let possible = nuisance(self.problem.case, data, &name, of, "interference_sine");
         if is_free || possible.is_err() {
             return Vec::new();
         }
@@ -189,7 +179,8 @@ impl Search<'_> {
         let of_period = |period: f64| {
             let count = found.solution.residuals.len();
             let mut change = DMatrix::zeros(count, 2);
-            for (index, ((_, row), point)) in rows.iter().zip(found.solution.point.iter()).enumerate()
+            for (index, ((_, row), point)) in
+                rows.iter().zip(found.solution.point.iter()).enumerate()
             {
                 if point.lost || row.values[column].is_none() {
                     continue;
@@ -323,13 +314,18 @@ impl Search<'_> {
             (Target::Offset(column), _) => format!("{} has an offset", name(column)),
             (Target::Place(_) | Target::Key(_), _) => "the distance has another zero".to_owned(),
         };
-        let value = match candidate.period {
-            Some(period) => format!("a period of {:.0} nm", 1e9 * period),
-            None => {
-                let digits = format!("{:.2e}", effect.value).parse().unwrap_or(effect.value);
-                let unit = if candidate.unit == "1" { "" } else { &candidate.unit };
-                format!("about {} {unit}", shortest(digits)).trim().to_owned()
-            }
+        let value = if let Some(period) = candidate.period {
+            format!("a period of {:.0} nm", 1e9 * period)
+        } else {
+            let value = format!("{:.2e}", effect.value);
+            let unit = match candidate.unit.as_str() {
+                "1" => String::new(),
+                unit => format!(" {unit}"),
+            };
+            format!(
+                "about {}{unit}",
+                shortest(value.parse().unwrap_or(effect.value))
+            )
         };
         format!(
             "the residuals look as if {shows}: with {} free ({value}) Akaike's criterion falls by some \

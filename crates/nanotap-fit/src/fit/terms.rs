@@ -120,8 +120,7 @@ impl Term {
     pub(super) fn unit(self, reading: &str, physical: bool) -> String {
         match (self, reading) {
             (Self::Drift | Self::Backlash | Self::Period, _) if physical => "m".to_owned(),
-            (Self::Drift | Self::Backlash | Self::Period, _) => "1".to_owned(),
-            (Self::Tilt, "m") => "1".to_owned(),
+            (Self::Drift | Self::Backlash | Self::Period, _) | (Self::Tilt, "m") => "1".to_owned(),
             (Self::Curvature, "m") => "1/m".to_owned(),
             (Self::Tilt, of) if physical => format!("{of}/m"),
             (Self::Curvature, of) if physical => format!("{of}/m^2"),
@@ -316,7 +315,11 @@ impl Data {
                     .iter()
                     .find(|(term, of, _)| *term == Term::Period && of == column);
                 let period = period.map_or(PERIOD, |(.., value)| *value);
-                if let Some(of) = row.values.get_mut(*column).filter(|_| !term.is_of_distance()) {
+                if let Some(of) = row
+                    .values
+                    .get_mut(*column)
+                    .filter(|_| !term.is_of_distance())
+                {
                     *of = of.map(|of| of - term.reading(*value, period, row.ramp));
                 }
             }
@@ -351,14 +354,20 @@ fn far_readings(curve: &Curve, column: usize) -> Vec<[f64; 2]> {
     let [baseline, _] = baseline_rows(&depth, &values);
     let [low, high] = span(baseline.iter().map(|row| depth[*row]));
     let of_rows = |rows: Vec<usize>| -> Vec<[f64; 2]> {
-        rows.into_iter().map(|row| [depth[row], values[row]]).collect()
+        rows.into_iter()
+            .map(|row| [depth[row], values[row]])
+            .collect()
     };
     if high - low > PERIODS[1] {
         return of_rows(baseline);
     }
     let [low, high] = span(depth.iter().copied());
     let middle = 0.5 * (low + high);
-    of_rows((0..depth.len()).filter(|row| depth[*row] > middle).collect())
+    of_rows(
+        (0..depth.len())
+            .filter(|row| depth[*row] > middle)
+            .collect(),
+    )
 }
 
 /// The period between two limits whose sinusoid, with a parabola, leaves the least residuals of
@@ -387,7 +396,9 @@ fn best_period(rows: &[[f64; 2]], limits: [f64; 2]) -> Option<(f64, f64)> {
     }
     let without = squares(None)?;
     let found = periods(span(rows.iter().map(|row| row[0])), limits);
-    let found = found.into_iter().filter_map(|p| Some((p, squares(Some(p))? / without)));
+    let found = found
+        .into_iter()
+        .filter_map(|p| Some((p, squares(Some(p))? / without)));
     found.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 

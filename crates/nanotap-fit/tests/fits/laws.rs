@@ -14,11 +14,20 @@ const LEVER: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"32
 fn rows_without_an_orbit_do_not_decide_between_laws() {
     let truth = case(LEVER, &[]);
     let rows = tapping(&truth, 18.0, 6.0, 13);
-    let rows: Vec<_> = rows.into_iter().filter(|row| row.3 == Way::Approach).collect();
+    let rows: Vec<_> = rows
+        .into_iter()
+        .filter(|row| row.3 == Way::Approach)
+        .collect();
     let mut noise = Noise(31);
-    let mut amplitude: Vec<f64> = rows.iter().map(|row| row.1 + 0.01 * noise.normal()).collect();
+    let mut amplitude: Vec<f64> = rows
+        .iter()
+        .map(|row| row.1 + 0.01 * noise.normal())
+        .collect();
     let mut distance: Vec<f64> = rows.iter().map(|row| row.0).collect();
-    let mut phase: Vec<f64> = rows.iter().map(|row| row.2 + 0.05 * noise.normal()).collect();
+    let mut phase: Vec<f64> = rows
+        .iter()
+        .map(|row| row.2 + 0.05 * noise.normal())
+        .collect();
     let mut ways: Vec<Way> = rows.iter().map(|row| row.3).collect();
     // A position at which no law has an orbit: the lever is deep in the sample.
     distance.push(-4000.0);

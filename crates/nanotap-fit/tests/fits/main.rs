@@ -25,7 +25,8 @@ impl Noise {
 
     fn normal(&mut self) -> f64 {
         let (u, v) = (self.uniform(), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        (-2.0 * nanotap_arithmetic::ln(u)).sqrt()
+            * nanotap_arithmetic::cos(std::f64::consts::TAU * v)
     }
 }
 
@@ -50,7 +51,12 @@ fn tapping(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64
     let report = approach(case, &options, &Control::default()).unwrap();
     let rows = report.table.iter().map(|p| {
         let seen = &p.physical.as_ref().unwrap().observables;
-        (p.zc.unwrap() * 1e9, seen.first_harmonic * 1e9, seen.phase, p.way)
+        (
+            p.zc.unwrap() * 1e9,
+            seen.first_harmonic * 1e9,
+            seen.phase,
+            p.way,
+        )
     });
     rows.collect()
 }
@@ -58,7 +64,12 @@ fn tapping(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64
 fn table(columns: Vec<(&str, Vec<f64>)>, ways: &[Way]) -> Table {
     let mut all: Vec<(String, Vec<Entry>)> = columns
         .into_iter()
-        .map(|(name, values)| (name.to_owned(), values.into_iter().map(Entry::Number).collect()))
+        .map(|(name, values)| {
+            (
+                name.to_owned(),
+                values.into_iter().map(Entry::Number).collect(),
+            )
+        })
         .collect();
     let ways = ways.iter().map(|way| Entry::Text(way.name().to_owned()));
     all.push(("direction".to_owned(), ways.collect()));

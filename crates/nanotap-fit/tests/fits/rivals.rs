@@ -15,8 +15,14 @@ const LEVER: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"0.8736193621040327 
 fn record(with_phase: bool) -> Table {
     let rows = tapping(&case(LEVER, &[]), 24.0, 13.0, 18);
     let mut noise = Noise(5);
-    let amplitude: Vec<f64> = rows.iter().map(|row| row.1 + 0.03 * noise.normal()).collect();
-    let phase: Vec<f64> = rows.iter().map(|row| row.2 + 0.1 * noise.normal()).collect();
+    let amplitude: Vec<f64> = rows
+        .iter()
+        .map(|row| row.1 + 0.03 * noise.normal())
+        .collect();
+    let phase: Vec<f64> = rows
+        .iter()
+        .map(|row| row.2 + 0.1 * noise.normal())
+        .collect();
     let mut columns = vec![
         ("distance (nm)", rows.iter().map(|row| row.0).collect()),
         ("amplitude (nm)", amplitude),
@@ -48,9 +54,15 @@ fn an_amplitude_alone_has_two_minima_and_the_phase_decides() {
     assert!(report.fits, "{:?}", report.reason);
     let rival = report.rivals.first().expect("a rival");
     let other = rival.parameters.iter().find(|p| p.key == "sample.hamaker");
-    let mut both = [parameter(&report, "sample.hamaker").value, other.unwrap().value];
+    let mut both = [
+        parameter(&report, "sample.hamaker").value,
+        other.unwrap().value,
+    ];
     both.sort_by(f64::total_cmp);
-    assert!(both[0] < 6e-21 && (2.2e-20..3.8e-20).contains(&both[1]), "{both:?}");
+    assert!(
+        both[0] < 6e-21 && (2.2e-20..3.8e-20).contains(&both[1]),
+        "{both:?}"
+    );
     assert_eq!(rival.decides.as_deref(), Some("phase"), "{}", rival.words);
     let report = found(true, Some(1000));
     assert!(report.rivals.is_empty(), "{:?}", report.rivals);
@@ -63,10 +75,17 @@ fn an_amplitude_alone_has_two_minima_and_the_phase_decides() {
 fn a_search_that_ends_early_says_so() {
     let report = found(false, Some(1));
     let said = |text: &str| report.remarks.iter().any(|remark| remark.contains(text));
-    assert!(said("other minima") && said("intervals") && said("evaluations"), "{:?}", report.remarks);
+    assert!(
+        said("other minima") && said("intervals") && said("evaluations"),
+        "{:?}",
+        report.remarks
+    );
     // The intervals are those of the standard errors.
     let offset = parameter(&report, "gap.offset");
     let half = 2.1 * offset.standard_error.unwrap();
     let [low, high] = offset.interval.map(|end| end.unwrap());
-    assert!(high - low < 2.0 * half && low < offset.value && offset.value < high, "{offset:?}");
+    assert!(
+        high - low < 2.0 * half && low < offset.value && offset.value < high,
+        "{offset:?}"
+    );
 }

@@ -31,7 +31,10 @@ fn force_curve() -> (Vec<[f64; 2]>, Vec<Way>) {
     let curve = ForceCurveStudy::run(&case(LEVER, &[]), &options, &Control::default()).unwrap();
     let rows = curve.points.iter().map(|p| {
         let compliance = OMITTED * p.force;
-        [1e9 * (p.distance - compliance), 1e9 * (p.deflection + compliance)]
+        [
+            1e9 * (p.distance - compliance),
+            1e9 * (p.deflection + compliance),
+        ]
     });
     (rows.collect(), curve.points.iter().map(|p| p.way).collect())
 }
@@ -131,12 +134,17 @@ fn recorded(example: Option<&Example>, seed: u64) -> Table {
             "deflection.curvature" => 0.5 * truths[0] * depth * depth,
             "deflection.interference" => {
                 let angle = std::f64::consts::TAU * depth / truths[2];
-                truths[0] * angle.sin() + truths[1] * angle.cos()
+                let (sine, cosine) = nanotap_arithmetic::sin_cos(angle);
+                truths[0] * sine + truths[1] * cosine
             }
             "deflection.drag" => truths[0] * side(&ways[k]),
             _ => 0.0,
         };
-        let scale = if key == "deflection.scale" { truths[0] } else { 1.0 };
+        let scale = if key == "deflection.scale" {
+            truths[0]
+        } else {
+            1.0
+        };
         scale * value + 1e9 * term + 3.0 + NOISE * noise.normal()
     });
     let deflection = deflection.collect();
@@ -185,7 +193,11 @@ fn each_term_is_found_suggested_and_needed() {
 fn clean_curves_suggest_nothing() {
     for seed in 0..8 {
         let report = fitted(&start(), &options(recorded(None, 100 + seed), &FREE));
-        assert!(report.suggestions.is_empty(), "{seed} {:?}", report.suggestions);
+        assert!(
+            report.suggestions.is_empty(),
+            "{seed} {:?}",
+            report.suggestions
+        );
         assert!(off(&report, "sample.modulus", MODULUS) < 4.0);
     }
 }
@@ -208,7 +220,9 @@ fn derivatives_by_terms_are_exact() {
         ..options(table, &names)
     };
     let x = [200e6, 1e-3, 2e3, 1e-9, -2e-9, 340e-9, 1e-9, 5e-9, 3e-9, 1.1];
-    let steps = [2e4, 1e-7, 1.0, 1e-13, 1e-13, 1e-12, 1e-13, 1e-13, 1e-13, 1e-6];
+    let steps = [
+        2e4, 1e-7, 1.0, 1e-13, 1e-13, 1e-12, 1e-13, 1e-13, 1e-13, 1e-6,
+    ];
     let at = |x: &[f64]| residuals(&start(), &request, x, &Control::default()).unwrap();
     let exact = at(&x).jacobian;
     for (k, step) in steps.iter().enumerate() {
@@ -221,7 +235,11 @@ fn derivatives_by_terms_are_exact() {
         for row in 0..exact.nrows() {
             let slope = (high[row] - low[row]) / (2.0 * step);
             let wrong = (slope - exact[(row, k)]).abs();
-            assert!(wrong < 1e-4 * largest, "{k} {row}: {slope} {}", exact[(row, k)]);
+            assert!(
+                wrong < 1e-4 * largest,
+                "{k} {row}: {slope} {}",
+                exact[(row, k)]
+            );
         }
     }
 }
@@ -258,7 +276,12 @@ fn a_tilt_of_a_tapping_curve_is_found() {
     let free = ["sample.stiffness", "sample.loss_tangent", "gap.offset"];
     let without = fitted(&truth, &options(record(0.01, 3), &free));
     let names: Vec<&str> = without.suggestions.iter().map(|s| s.key.as_str()).collect();
-    assert_eq!(names.first(), Some(&"amplitude.tilt"), "{:?}", without.suggestions);
+    assert_eq!(
+        names.first(),
+        Some(&"amplitude.tilt"),
+        "{:?}",
+        without.suggestions
+    );
     let free_too = [&free[..], &["amplitude.tilt"]].concat();
     let with = fitted(&truth, &options(record(0.01, 3), &free_too));
     assert!(off(&with, "amplitude.tilt", 0.01) < 4.0, "{with:?}");

@@ -537,7 +537,9 @@ impl Problem<'_> {
     pub(super) fn jump_residual(&self, x: &[f64], point: &Point, index: usize) -> f64 {
         let (jump, fold) = (&self.jumps[index], &point.folds[index]);
         let all = self.parameters.iter().zip(x);
-        let offset: f64 = all.map(|(p, value)| self.shift_of_jump(p, jump) * value).sum();
+        let offset: f64 = all
+            .map(|(p, value)| self.shift_of_jump(p, jump) * value)
+            .sum();
         fold.as_ref()
             .map_or(0.0, |fold| (fold.at - offset - jump.at()) / jump.error())
     }
@@ -553,7 +555,9 @@ impl Problem<'_> {
         };
         let rows = &self.data.curves[jump.curve].rows;
         let first = self.index_of(jump.curve);
-        let of = jump.rows.map(|row| self.shift_by(parameter, jump.curve, &rows[row - first]));
+        let of = jump
+            .rows
+            .map(|row| self.shift_by(parameter, jump.curve, &rows[row - first]));
         0.5 * (of[0] + of[1])
     }
 

@@ -105,7 +105,7 @@ pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitRe
         };
         x = found.solution.x.clone();
         if round == ROUNDS && !search.control.is_cancelled() {
-            let mut again = weighted.report(found, report.starts);
+            let mut again = weighted.report(found, &[], report.starts);
             again.preparation.push(
                 "the law does not describe the curve to its noise: forces at the same position of the \
                  tip are compared, not deflections at the same distance"

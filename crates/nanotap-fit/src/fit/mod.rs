@@ -26,8 +26,8 @@ mod baseline;
 mod blocks;
 mod branches;
 mod data;
-mod force_curve;
 mod effort;
+mod force_curve;
 mod guess;
 mod implied_case;
 pub(crate) mod instrument;
@@ -63,7 +63,8 @@ use nanotap_observe::frame::Frame;
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, Estimate, FitReport, FittedColumn, FittedForceCurve, FittedJump,
-    FittedParameter, FittedRow, OtherOrbit, Reading, Rival, RivalParameter, Suggestion, Undetermined,
+    FittedParameter, FittedRow, OtherOrbit, Reading, Rival, RivalParameter, Suggestion,
+    Undetermined,
 };
 
 pub use selection::Segment;

@@ -521,6 +521,7 @@ impl Search<'_> {
             size: stiffness,
             is_given: true,
             is_limited: false,
+            prior: None,
         });
         let problem = Problem {
             parameters: &parameters,

@@ -108,7 +108,11 @@ impl Contact {
                     .rows
                     .first()
                     .map_or(0.0, |row| problem.place(&x, curve, row)[0] - row.at[0]),
-                baseline: problem.read(&x, curve, 0, 0.0),
+                // The terms of the instrument are measured from the farthest row.
+                baseline: of
+                    .rows
+                    .first()
+                    .map_or(0.0, |row| problem.read(&x, curve, row, 0, 0.0)),
                 scale: problem.scale(&x, curve, 0),
                 stiffness: case.get(Key::LeverK),
                 quantity,
@@ -363,6 +367,7 @@ mod tests {
             way: Some(Way::Approach),
             line: 7,
             is_free: false,
+            ramp: crate::fit::terms::Ramp::default(),
         };
         // Deflected by 3 nm while the base is 10 nm below the contact point.
         let [force, depth] = contact.of_row(&row).unwrap();

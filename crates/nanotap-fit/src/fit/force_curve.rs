@@ -12,6 +12,7 @@ use super::selection::{self, Contact};
 use nanotap_case::physical::Kind;
 use nanotap_case::under_law::LawName;
 use nanotap_case::{Case, Key};
+use nanotap_error::Error;
 
 use nanotap_motions::approach::Way;
 
@@ -35,12 +36,15 @@ const MIN_ROWS: usize = 5;
 
 /// Frees what a force curve determines: the modulus, the contact point, the baseline and the adhesion;
 /// the contact point and the baseline of each curve if there are several. Says so.
+///
+/// # Errors
+/// If the data have fewer values.
 pub(super) fn free_by_default(
     case: &Case,
     data: &Data,
     free: &mut Vec<String>,
     per_curve: &mut Vec<String>,
-) -> String {
+) -> Result<String, Error> {
     let is_stated = |key: &Key| case.stated(*key).is_some();
     let stiffness = [Key::SampleModulus, Key::SampleStiffness];
     let mut keys: Vec<Key> = stiffness.into_iter().filter(is_stated).take(1).collect();
@@ -63,11 +67,23 @@ pub(super) fn free_by_default(
     } else {
         free.extend(offsets);
     }
+    let unknown = free.len() + data.curves.len() * per_curve.len();
+    if data.count() <= unknown {
+        let names: Vec<&str> = data.curves.iter().map(|of| of.name.as_str()).collect();
+        return Err(Error::input(
+            format!(
+                "{}: {} rows are too few for a fit of {unknown} values: modulus, contact point, baseline",
+                names.join(", "),
+                data.count()
+            ),
+            "fit a curve that was recorded to its end",
+        ));
+    }
     let all: Vec<&str> = free.iter().chain(&*per_curve).map(String::as_str).collect();
-    format!(
+    Ok(format!(
         "free, because the option `free` names nothing: {}",
         all.join(", ")
-    )
+    ))
 }
 
 /// Fits again by forces at the same position of the tip, as most programs do, if the law is elastic and

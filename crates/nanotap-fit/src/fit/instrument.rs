@@ -267,10 +267,14 @@ fn force_of_deflection(table: &mut Table, columns: &mut [String], notes: &mut Ve
     }
 }
 
-/// Refuses a column in V, with the conversion that it needs.
+/// Units of a detector's current.
+const CURRENTS: [&str; 6] = ["A", "mA", "uA", "µA", "nA", "pA"];
+
+/// Refuses a column in V or A, with the conversion that it needs.
 fn check_volts(table: &Table, place: usize, renamed: &[(String, String)]) -> Result<(), Error> {
     let Header { name, unit } = Header::of(&table.columns[place].0);
-    if unit.is_empty() || Kind::Voltage.parse(&format!("1 {unit}")).is_err() {
+    let is_voltage = Kind::Voltage.parse(&format!("1 {unit}")).is_ok();
+    if unit.is_empty() || !(is_voltage || CURRENTS.contains(&unit.as_str())) {
         return Ok(());
     }
     let place = table.place(None, place);

@@ -393,12 +393,8 @@ fn with_search<R>(
         channels.rows = own.map_or(channels.rows, |curve| curve.rows.len());
     }
     if data.is_force_curve() && free.is_empty() && per_curve.is_empty() {
-        preparation.push(force_curve::free_by_default(
-            &case,
-            &data,
-            &mut free,
-            &mut per_curve,
-        ));
+        let note = force_curve::free_by_default(&case, &data, &mut free, &mut per_curve)?;
+        preparation.push(note);
     }
     data.add_free_scatter();
     preparation.extend(data.average(request.rows));

@@ -23,6 +23,7 @@ use nanotap_observe::OBSERVABLES;
 
 use super::quantity::Quantity;
 use super::terms::Ramp;
+use super::statistics::span;
 use super::thin::Scatter;
 use nanotap_case::table::{Entry, Header, Table};
 
@@ -96,6 +97,8 @@ pub struct Row {
     pub way: Option<Way>,
     /// Line in the file, or number of the row from 1.
     pub line: u64,
+    /// How many rows it is the average of.
+    pub(crate) count: usize,
     /// Whether it is far from the sample, where the scatter of the values is known.
     pub(crate) is_free: bool,
     /// Where it is on the ramp of its curve.
@@ -358,6 +361,7 @@ impl Data {
             relative: vec![1.0; self.columns.len()],
             way: None,
             line: table.lines.get(index).copied().unwrap_or(index as u64 + 1),
+            count: 1,
             is_free: false,
             ramp: Ramp::default(),
         };
@@ -444,6 +448,11 @@ impl Data {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             let squares = values.iter().map(|value| (value - mean).powi(2));
             column.spread = (squares.sum::<f64>() / values.len() as f64).sqrt();
+            if column.quantity.rest().is_some() {
+                // Of a long ramp few rows are in contact: as if the values were uniform in their range.
+                let [least, most] = span(values.iter().copied());
+                column.spread = column.spread.max((most - least) / 12f64.sqrt());
+            }
         }
         let count = self.columns.len();
         let distinct = |index: usize| {

@@ -95,7 +95,7 @@ pub(super) fn free_by_default(
 pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitReport {
     let law = search.problem.case.stated(Key::SampleLaw);
     let is_elastic = law.is_some_and(|law| selection::is_elastic(&law.text()));
-    if !is_elastic || !report.fits || !report.misfit {
+    if !is_elastic || !report.misfit {
         return report;
     }
     let mut x: Vec<f64> = report.parameters.iter().map(|p| p.value).collect();
@@ -105,7 +105,8 @@ pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitRe
             let factors = search.problem.stiffness_factors(&x, index);
             let known = &search.problem.data.curves[index].rows;
             for ((row, known), factor) in curve.rows.iter_mut().zip(known).zip(factors) {
-                row.relative[0] = known.relative[0] / factor;
+                // What the residuals are is not the scatter of the rows: each counts alike.
+                row.relative[0] = 1.0 / ((known.count as f64).sqrt() * factor);
                 row.errors[0] = known.errors[0].map(|error| error / factor);
             }
         }

@@ -366,6 +366,7 @@ mod tests {
             relative: vec![1.0],
             way: Some(Way::Approach),
             line: 7,
+            count: 1,
             is_free: false,
             ramp: crate::fit::terms::Ramp::default(),
         };

@@ -495,6 +495,7 @@ impl Bin {
         let mut row = rows[0].clone();
         row.at[0] = self.distance;
         row.ramp = Ramp::mean(rows);
+        row.count = rows.iter().map(|row| row.count).sum();
         // The scatter of averages is known from their own rows.
         row.is_free = false;
         for (column, fits) in self.fits.iter().enumerate() {

@@ -601,7 +601,7 @@ def fm(
     return _studies.document("fm", case, options, threads, progress)
 
 def fit(
-    case: Case,
+    case: Case | Path | Any,
     *,
     data: Any = None,
     free: Sequence[str] | None = None,
@@ -611,6 +611,12 @@ def fit(
     bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     columns: Sequence[str] | None = None,
     pixels: Sequence[str] | None = None,
+    segment: Literal["approach", "retract", "both"] | None = None,
+    range: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    tip_radius: float | str | None = None,
+    half_angle: float | str | None = None,
+    spring_constant: float | str | None = None,
+    poisson: float | str | None = None,
     laws: Sequence[str] | None = None,
     rows: int = 100,
     starts: int = 8,
@@ -619,6 +625,7 @@ def fit(
     jumps: bool = True,
     phase: float = 90.0,
     profile: bool = True,
+    curve: int | None = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Fit:
@@ -626,14 +633,17 @@ def fit(
 
     Parameters
     ----------
-    case : Case
-        The case.
+    case : Case | Path | Any
+        The case, or the path of its file; or, without `data`, the measured curve
+        itself, of which a force curve needs no case: the file's header has the
+        lever, `tip_radius` states the tip.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
     free : Sequence[str] | None
         Parameters to find: keys of the case, gap.offset, and NAME.offset or
-        NAME.scale of a column.
+        NAME.scale of a column; default for a force curve: modulus, contact point,
+        baseline, and the adhesion of the law.
     per_curve : Sequence[str] | None
         Parameters to find with one value per curve.
     convert : Sequence[str] | None
@@ -649,6 +659,22 @@ def fit(
     pixels : Sequence[str] | None
         Columns that name the pixel of a force volume, as in x,y: one fit a pixel,
         into a dataset.
+    segment : Literal["approach", "retract", "both"] | None
+        Segment of a curve to fit; default for a force curve: its approach under an
+        elastic law, both under one with adhesion or losses.
+    range : Mapping[str, tuple[float | str, float | str]] | str | None
+        Rows to fit: their numbers, or forces from the baseline, or indentations
+        from the contact point, as in {"rows": (100, 2000)}, {"force": ("0.1 nN", "2
+        nN")} or {"indentation": ("-1 um", "300 nm")}.
+    tip_radius : float | str | None
+        Radius of the tip, as in "40 nm", in place of the case's.
+    half_angle : float | str | None
+        Half angle of a conical tip, as in "20 deg", in place of the case's.
+    spring_constant : float | str | None
+        Stiffness of the lever, as in "0.05 N/m", in place of the case's and of the
+        file's header.
+    poisson : float | str | None
+        Poisson's ratio of the sample, in place of the case's; without a case 0.5.
     laws : Sequence[str] | None
         Contact laws to compare, as in hertz,dmt; default: the law of the case.
     rows : int
@@ -667,6 +693,9 @@ def fit(
         shift.
     profile : bool
         Intervals from the profile of the likelihood.
+    curve : int | None
+        Number of the curve of an instrument's file with several, from 0; default:
+        the first.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress
@@ -676,8 +705,9 @@ def fit(
     Returns
     -------
     `parameters` (key, value, standard_error, interval, unit), `chi2`,
-    `undetermined`, `correlations`, the `rows` with model and residuals; `best` and
-    `errors` by key, and `best_case()`, the case of the best fit.
+    `undetermined`, `correlations`, the `rows` with model and residuals;
+    `force_curves`, what each force curve says of the sample; `best` and `errors` by
+    key, and `best_case()`, the case of the best fit.
 
     Raises
     ------
@@ -687,7 +717,7 @@ def fit(
         The computation failed.
     """
     options = _arguments.options("fit", locals())
-    return _studies.fit(case, options, threads, progress)
+    return _studies.fit(case, options, curve, threads, progress)
 
 def reconstruct(
     case: Case,

@@ -93,9 +93,13 @@ impl GivenCase {
             Case::load(arguments.file.as_deref(), &words, &catalogue)
         };
         let implied = implied_words(request, &arguments.set, load)?;
+        let is_implied = arguments.file.is_none() && !implied.words.is_empty();
         let mut arguments = arguments.clone();
         arguments.set.extend(implied.words);
-        Ok((Self::silent(&arguments)?, implied.notes))
+        let Self(case) = Self::silent(&arguments)?;
+        let data = request.data.first().filter(|_| is_implied);
+        let case = data.map_or_else(|| case.clone(), |data| case.clone().called(&data.name));
+        Ok((Self(case), implied.notes))
     }
 
     fn warned(case: Case, output: &Output) -> Self {

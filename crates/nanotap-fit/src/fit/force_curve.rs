@@ -1,14 +1,16 @@
 //! Force curves: what is free unless it is stated, and what a fit says of each curve in the words of
 //! the measurement.
 
-use super::data::Data;
+use super::FitOptions;
+use super::data::{Data, Row};
 use super::instrument::Channels;
-use super::parameters::Target;
+use super::parameters::{Parameter, Target};
 use super::problem::Problem;
-use super::quantity::RestQuantity;
+use super::quantity::{Quantity, RestQuantity};
 use super::report::{Estimate, FitReport, FittedForceCurve};
-use super::search::Search;
+use super::search::{Found, Search};
 use super::selection::{self, Contact};
+use super::solve::{LeastSquares as _, Solution};
 use nanotap_case::physical::Kind;
 use nanotap_case::under_law::LawName;
 use nanotap_case::{Case, Key};
@@ -29,8 +31,8 @@ const SAME_STIFFNESS: f64 = 1e-6;
 const DEEP: f64 = 1.0;
 /// A force below the baseline of more than this part of the largest is an adhesion that the law lacks.
 const ADHERES: f64 = 0.05;
-/// Rounds in which the weights of rows and the solution meet.
-const ROUNDS: usize = 3;
+/// Stiffness of a rigid lever, relative to that of the own one.
+const RIGID: f64 = 1e6;
 /// Fewest rows in contact, and before it, that determine a modulus and a baseline.
 const MIN_ROWS: usize = 5;
 
@@ -90,53 +92,174 @@ pub(super) fn free_by_default(
 /// does not describe the curve: then the result depends on what is compared.
 ///
 /// Rows whose residuals are noise are compared by deflections at the same distance, of which each has the
-/// same error. The two differ by the factor 1 + S/k, with the stiffness S of the contact, which the
-/// solution before gives.
+/// same error. Standard errors are those of these deflections, with the weight 1 + S/k of a contact of
+/// stiffness S, by which the two comparisons differ to first order.
 pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitReport {
     let law = search.problem.case.stated(Key::SampleLaw);
     let is_elastic = law.is_some_and(|law| selection::is_elastic(&law.text()));
-    if !is_elastic || !report.misfit {
+    if !is_elastic || !report.misfit || search.problem.data.columns.len() > 1 {
         return report;
     }
-    let mut x: Vec<f64> = report.parameters.iter().map(|p| p.value).collect();
+    let x: Vec<f64> = report.parameters.iter().map(|p| p.value).collect();
+    let Some(x) = best_by_force(search, &x) else {
+        return report;
+    };
     let mut data = search.problem.data.clone();
-    for round in 1..=ROUNDS {
-        for (index, curve) in data.curves.iter_mut().enumerate() {
-            let factors = search.problem.stiffness_factors(&x, index);
-            let known = &search.problem.data.curves[index].rows;
-            for ((row, known), factor) in curve.rows.iter_mut().zip(known).zip(factors) {
-                // What the residuals are is not the scatter of the rows: each counts alike.
-                row.relative[0] = 1.0 / ((known.count as f64).sqrt() * factor);
-                row.errors[0] = known.errors[0].map(|error| error / factor);
-            }
-        }
-        let weighted = Search {
-            problem: Problem {
-                data: &data,
-                ..search.weighted(Vec::new(), None)
-            },
-            ..*search
-        };
-        let Some(found) = weighted.fine(x) else {
-            break;
-        };
-        x = found.solution.x.clone();
-        if round == ROUNDS && !search.control.is_cancelled() {
-            let mut again = weighted.report(found, &[], report.starts);
-            again.preparation.push(
-                "the law does not describe the curve to its noise: forces at the same position of the \
-                 tip are compared, not deflections at the same distance"
-                    .to_owned(),
-            );
-            return FitReport {
-                // How large the residuals are is said in terms of the noise.
-                remarks: report.remarks,
-                misfit: true,
-                ..again
-            };
+    for (index, curve) in data.curves.iter_mut().enumerate() {
+        let factors = search.problem.stiffness_factors(&x, index);
+        for (row, factor) in curve.rows.iter_mut().zip(factors) {
+            row.relative[0] = counting_alike(row) / factor;
+            row.errors[0] = row.errors[0].map(|error| error / factor);
         }
     }
-    report
+    let noise = search.rough_noise();
+    let problem = Problem {
+        data: &data,
+        ..search.weighted(noise, None)
+    };
+    // Other values than these are the best of this problem.
+    let request = FitOptions {
+        data: Vec::new(),
+        profile: false,
+        ..search.request.clone()
+    };
+    let weighted = Search {
+        problem,
+        request: &request,
+        ..*search
+    };
+    let Some(found) = weighted.at(&x) else {
+        return report;
+    };
+    let again = weighted.report(found, report.starts);
+    let mut preparation = again.preparation;
+    preparation.push(
+        "the law does not describe the curve to its noise: forces at the same position of the tip are \
+         compared, not deflections at the same distance"
+            .to_owned(),
+    );
+    FitReport {
+        preparation,
+        // How large the residuals are is said in terms of the noise.
+        remarks: report.remarks,
+        misfit: true,
+        ..again
+    }
+}
+
+/// The standard error of a row relative to others if each row that it is the average of counts alike.
+fn counting_alike(row: &Row) -> f64 {
+    1.0 / (row.count.max(1) as f64).sqrt()
+}
+
+/// The best values by forces at the same position of the tip: those of a rigid lever that moves as the
+/// tip does. `None` where a parameter changes what the position or the force is.
+fn best_by_force(search: &Search<'_>, x: &[f64]) -> Option<Vec<f64>> {
+    let problem = &search.problem;
+    let k = problem.case.get(Key::LeverK);
+    let parameters = problem.parameters;
+    let is_free = |target: Target| parameters.iter().any(|p| p.target == target);
+    let is_shared = |target: Target| {
+        let mut of = parameters.iter().filter(|p| p.target == target);
+        of.next().is_none_or(|p| p.curve.is_none())
+    };
+    let [place, offset] = [Target::Place(0), Target::Offset(0)];
+    let changes = [Target::Scale(0), Target::Key(Key::LeverK)];
+    let follows = is_free(place) && is_shared(place) == is_shared(offset);
+    if changes.into_iter().any(is_free) || (is_free(offset) && !follows) {
+        return None;
+    }
+    let to_deflection = match problem.data.columns.first()?.quantity.rest()? {
+        RestQuantity::Deflection => 1.0,
+        RestQuantity::Force => 1.0 / k,
+    };
+    let to_force = k * to_deflection;
+    let mut data = problem.data.clone();
+    let column = &mut data.columns[0];
+    column.quantity = Quantity::Rest(RestQuantity::Force);
+    column.spread *= to_force;
+    column.scatter = None;
+    for row in data.curves.iter_mut().flat_map(|curve| &mut curve.rows) {
+        let Some(value) = row.values[0] else { continue };
+        row.at[0] += to_deflection * value;
+        row.values[0] = Some(to_force * value);
+        row.errors[0] = row.errors[0].map(|error| to_force * error);
+        row.relative[0] = counting_alike(row);
+    }
+    // The position of the tip contains the baseline, which the distance does not.
+    let baseline = |x: &[f64], curve: Option<usize>, unit: f64| {
+        let mut both = parameters.iter().zip(x);
+        let found = both.find(|(p, _)| p.target == offset && p.curve == curve);
+        found.map_or(0.0, |(_, value)| unit * value)
+    };
+    let of_tip = parameters.iter().zip(x).map(|(parameter, value)| {
+        let mut own = parameter.clone();
+        own.is_given = true;
+        own.start = *value;
+        if own.target == offset {
+            own.start *= to_force;
+            own.size *= to_force;
+            own.bounds = (to_force * own.bounds.0, to_force * own.bounds.1);
+        } else if own.target == place {
+            own.start -= baseline(x, own.curve, to_deflection);
+        }
+        own
+    });
+    let of_tip: Vec<Parameter> = of_tip.collect();
+    let case = problem.case.with(Key::LeverK, RIGID * k);
+    let rigid = Search {
+        problem: Problem {
+            case: &case,
+            data: &data,
+            parameters: &of_tip,
+            ..search.weighted(Vec::new(), None)
+        },
+        ..*search
+    };
+    let found = rigid.fine(of_tip.iter().map(|p| p.start).collect())?;
+    let best = parameters.iter().zip(&found.solution.x).map(|(p, value)| {
+        if p.target == offset {
+            value / to_force
+        } else if p.target == place {
+            value + baseline(&found.solution.x, p.curve, 1.0 / k)
+        } else {
+            *value
+        }
+    });
+    Some(best.collect())
+}
+
+impl Search<'_> {
+    /// The fit at these values.
+    fn at(&self, x: &[f64]) -> Option<Found> {
+        let (mut point, candidates) = self.problem.discover(x, None);
+        let rows = self.problem.data.rows().count();
+        let residuals = self.problem.residuals(x, &point);
+        let freedom = rows.saturating_sub(x.len()).max(1) as f64;
+        // Standard errors for which chi2 is the degrees of freedom.
+        let factor = (residuals.norm_squared() / freedom).sqrt();
+        let noise = self.problem.noise.iter().map(|of| factor * of).collect();
+        let problem = Problem {
+            data: self.problem.data,
+            ..self.weighted(noise, None)
+        };
+        let residuals = problem.residuals(x, &point);
+        let jacobian = problem.jacobian(x, &mut point)?;
+        Some(Found {
+            solution: Solution {
+                x: x.to_vec(),
+                point,
+                cost: residuals.norm_squared(),
+                residuals,
+                jacobian,
+                iterations: 0,
+            },
+            noise: problem.noise,
+            jumps: Vec::new(),
+            candidates,
+            steps: 0,
+        })
+    }
 }
 
 /// What the fit of each force curve says; nothing for other data.

@@ -278,8 +278,8 @@ fn segment_and_range_select_rows() {
     assert!(run(&[])[0].abs() > 0.2);
     for range in [
         "indentation=-2 um:290 nm",
-        "rows=1:1000",
-        "force=-1 nN:0.5 nN",
+        "rows=1:1180",
+        "force=-1 nN:3 nN",
     ] {
         let [modulus, contact] = run(&["--range", range]);
         assert!(
@@ -397,7 +397,7 @@ fn the_header_is_the_lever_unless_the_case_states_another() {
         "measuredHeight",
         "hertz, tip radius 5 µm, Poisson's ratio 0.5",
         "approach, 800 rows",
-        "k = 50 mN/m from the file's header; InvOLS 50 nm/V",
+        "k = 50 mN/m from the file's header; InvOLS 50.00 nm/V",
     ] {
         assert!(text.stdout.contains(words), "{words} in {}", text.stdout);
     }

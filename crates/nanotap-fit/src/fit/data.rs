@@ -22,8 +22,8 @@ use nanotap_motions::approach::Way;
 use nanotap_observe::OBSERVABLES;
 
 use super::quantity::Quantity;
-use super::terms::Ramp;
 use super::statistics::span;
+use super::terms::Ramp;
 use super::thin::Scatter;
 use nanotap_case::table::{Entry, Header, Table};
 

@@ -131,7 +131,7 @@ pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitRe
     let Some(found) = weighted.at(&x) else {
         return report;
     };
-    let again = weighted.report(found, report.starts);
+    let again = weighted.report(found, &[], report.starts);
     let mut preparation = again.preparation;
     preparation.push(
         "the law does not describe the curve to its noise: forces at the same position of the tip are \

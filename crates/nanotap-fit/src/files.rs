@@ -184,7 +184,7 @@ fn walk(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), Err
 /// If the file cannot be read or has no such item.
 pub fn item(path: &Path, which: Which) -> Result<Item, Error> {
     let document = open(path)?;
-    let refuse = |message| refused(path, message);
+    let refuse = |message: String| refused(path, &message);
     let counts = [
         document.curve_count(),
         document.images.len(),
@@ -223,11 +223,11 @@ pub fn item(path: &Path, which: Which) -> Result<Item, Error> {
 /// # Errors
 /// If the file cannot be read, or is none of an instrument that is known here.
 pub fn open(path: &Path) -> Result<Document, Error> {
-    opened(path, Origin::User)?.map_err(|error| refused(path, error.to_string()))
+    opened(path, Origin::User)?.map_err(|error| refused(path, &error.to_string()))
 }
 
 /// The error of a file in which something is not found.
-fn refused(path: &Path, message: String) -> Error {
+fn refused(path: &Path, message: &str) -> Error {
     Error::input(
         format!("{}: {message}", path.display()),
         "`nanotap files` lists what a file holds",

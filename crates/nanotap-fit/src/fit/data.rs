@@ -492,7 +492,7 @@ impl Data {
 }
 
 /// True if a key is the distance between tip and sample.
-pub(crate) fn is_distance(key: Key) -> bool {
+pub fn is_distance(key: Key) -> bool {
     matches!(key, Key::GapTip | Key::Alpha5 | Key::OscillatorGap)
 }
 

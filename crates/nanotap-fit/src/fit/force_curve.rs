@@ -329,7 +329,7 @@ fn summary(
         _ => contact.stiffness,
     };
     let known = |key: Key| Some(case.get(key)).filter(|value| value.is_finite());
-    let law = case.stated(Key::SampleLaw).map(|law| law.text());
+    let law = case.stated(Key::SampleLaw).map(nanotap_case::Value::text);
     let quantity = data.columns[0].quantity.rest();
     let attracts = case
         .cantilever()

@@ -72,12 +72,13 @@ const OWN_PHASE: f64 = 15.0;
 const MIN_ROWS: usize = 12;
 
 /// Measured tables with the names and units that are known here.
-pub(crate) struct Prepared {
-    pub(crate) tables: Vec<Table>,
+pub struct Prepared {
+    /// The tables.
+    pub tables: Vec<Table>,
     /// The columns to use, by their present names.
-    pub(crate) columns: Vec<String>,
+    pub columns: Vec<String>,
     /// Sentences on conversions and guesses that were applied to the tables.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
     /// Whether the zero of a phase was guessed.
     pub(crate) guessed_phase: bool,
     /// What the distance and the deflection of each table are in its file.
@@ -86,7 +87,7 @@ pub(crate) struct Prepared {
 
 /// What the columns of a force curve are in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Channels {
+pub struct Channels {
     /// Name of the table.
     pub(crate) table: String,
     /// Name of the distance.
@@ -143,7 +144,7 @@ struct Stated {
 ///
 /// # Errors
 /// When a conversion is not understood, no table has its column, or a voltage cannot be converted.
-pub(crate) fn prepared(
+pub fn prepared(
     case: &Case,
     tables: &[Table],
     conversions: &[String],
@@ -1118,7 +1119,7 @@ fn turning_point(distance: &[f64]) -> Option<usize> {
 }
 
 /// The middle of some values.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     match values.len() {
@@ -1129,7 +1130,7 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// An angle in degrees in [−180, 180).
-pub(crate) fn wrapped(degrees: f64) -> f64 {
+pub fn wrapped(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 

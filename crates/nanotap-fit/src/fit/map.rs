@@ -223,31 +223,28 @@ impl Source {
 
     /// The pixels of a file by its grid, or by the numbers of its curves.
     fn of_file(document: &Arc<Document>, name: String) -> (Self, Vec<Pixels>) {
-        let (curves, axes) = match document.grid {
-            Some(grid) => {
-                let [columns, lines] = grid.shape;
-                let axis = |name: &str, k: usize| Pixels {
-                    name: name.to_owned(),
-                    unit: "m".to_owned(),
-                    values: (0..grid.shape[k])
-                        .map(|at| (at as f64 + 0.5) * grid.size[k] / grid.shape[k] as f64)
-                        .collect(),
-                };
-                let cells = (0..lines).flat_map(|line| (0..columns).map(move |at| [at, line]));
-                let numbered = cells.enumerate();
-                let curves =
-                    numbered.filter_map(|(entry, cell)| Some((entry, document.number_at(cell)?)));
-                (curves.collect(), vec![axis("y", 1), axis("x", 0)])
-            }
-            None => {
-                let all = 0..document.curve_count();
-                let axis = Pixels {
-                    name: "curve".to_owned(),
-                    unit: "1".to_owned(),
-                    values: all.clone().map(|number| number as f64).collect(),
-                };
-                (all.map(|number| (number, number)).collect(), vec![axis])
-            }
+        let (curves, axes) = if let Some(grid) = document.grid {
+            let [columns, lines] = grid.shape;
+            let axis = |name: &str, k: usize| Pixels {
+                name: name.to_owned(),
+                unit: "m".to_owned(),
+                values: (0..grid.shape[k])
+                    .map(|at| (at as f64 + 0.5) * grid.size[k] / grid.shape[k] as f64)
+                    .collect(),
+            };
+            let cells = (0..lines).flat_map(|line| (0..columns).map(move |at| [at, line]));
+            let numbered = cells.enumerate();
+            let curves =
+                numbered.filter_map(|(entry, cell)| Some((entry, document.number_at(cell)?)));
+            (curves.collect(), vec![axis("y", 1), axis("x", 0)])
+        } else {
+            let all = 0..document.curve_count();
+            let axis = Pixels {
+                name: "curve".to_owned(),
+                unit: "1".to_owned(),
+                values: all.clone().map(|number| number as f64).collect(),
+            };
+            (all.map(|number| (number, number)).collect(), vec![axis])
         };
         let document = Arc::clone(document);
         let source = Self::File {

@@ -30,7 +30,7 @@ mod effort;
 mod force_curve;
 mod guess;
 mod implied_case;
-pub(crate) mod instrument;
+pub mod instrument;
 mod jumps;
 mod laws;
 mod map;
@@ -47,12 +47,12 @@ mod solve;
 mod statistics;
 mod suggestions;
 pub(crate) mod terms;
-pub(crate) mod thin;
+pub mod thin;
 
 use nanotap_dynamics::Control;
 
 use crate::figure::fit::fit_figure;
-pub(crate) use data::is_distance;
+pub use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use implied_case::{ImpliedWords, implied_words};
 pub(crate) use map::OF_FORCES;

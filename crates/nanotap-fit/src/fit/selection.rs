@@ -64,7 +64,7 @@ pub(super) fn is_elastic(law: &str) -> bool {
 /// The segment of a force curve that is fitted where the request does not state one: the approach of an
 /// elastic law, both where a law has adhesion or losses.
 pub(super) fn default_segment(case: &Case, request: &FitOptions) -> Segment {
-    let own = case.stated(Key::SampleLaw).map(|law| law.text());
+    let own = case.stated(Key::SampleLaw).map(nanotap_case::Value::text);
     let mut laws = names(&request.laws);
     if laws.is_empty() {
         laws.extend(own);

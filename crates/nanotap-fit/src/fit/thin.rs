@@ -56,7 +56,7 @@ const FLOORS: [f64; 2] = [1e-4, 0.01];
 
 /// Bins of consecutive rows, at most about `count`: `values` are the columns, `errors` the standard
 /// errors of one row.
-pub(crate) fn bins(
+pub fn bins(
     distance: &[f64],
     values: &[Vec<f64>],
     errors: &[f64],

@@ -3,12 +3,13 @@
 
 pub mod registry;
 
-pub use nanotap_fit::{calibrate, fit, reconstruct};
+pub use nanotap_fit::{calibrate, fit};
 pub use nanotap_motions::simulate::fixed_step;
 pub use nanotap_motions::{
     approach, attractors, branch, event, frequency_modulation, lyapunov, orbit, proof, setpoint,
     simulate, upset,
 };
+pub use nanotap_reconstruct::reconstruct;
 pub use nanotap_scan::{force_curve, scan};
 pub use nanotap_study::{
     Computation, DatasetPlan, DatasetStudy, Document, FreeMotion, Study, averaged_orbits,

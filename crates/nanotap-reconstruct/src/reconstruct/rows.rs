@@ -1,10 +1,10 @@
 //! The rows of a measured curve: the columns that are used, the free level, the noise, and averages
 //! of many rows.
 
-use crate::fit::instrument::{median, wrapped};
-use crate::fit::thin::bins;
-use crate::fit::{Data, Row};
 use nanotap_error::Error;
+use nanotap_fit::fit::instrument::{median, wrapped};
+use nanotap_fit::fit::thin::bins;
+use nanotap_fit::fit::{Data, Row};
 use nanotap_motions::approach::Way;
 use nanotap_observe::table::shown_phase;
 
@@ -101,7 +101,7 @@ impl Readings {
         if !data
             .swept
             .first()
-            .is_some_and(|swept| crate::fit::is_distance(swept.key))
+            .is_some_and(|swept| nanotap_fit::fit::is_distance(swept.key))
         {
             return Err(missing("distance"));
         }

@@ -24,9 +24,9 @@ use super::lever::{FirstHarmonic, Method};
 use super::motion::{Harmonics, Known, Motion, Weights};
 use super::nodes::{Kernel, Nodes};
 use super::smooth::Smooth;
-use crate::fit::instrument::median;
 use nanotap_dynamics::control::Control;
 use nanotap_error::Error;
+use nanotap_fit::fit::instrument::median;
 
 /// Number of passes; the first one takes the motion as sinusoidal.
 pub(super) const PASSES: usize = 12;

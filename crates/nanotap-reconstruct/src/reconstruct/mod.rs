@@ -30,12 +30,12 @@ pub use report::{
 };
 
 use crate::figure::reconstruct::reconstruct_figure;
-use crate::fit::Data;
-use crate::fit::instrument::{self, wrapped};
 use nanotap_case::Case;
 use nanotap_case::physical::Kind as Quantity;
 use nanotap_case::table::Table;
 use nanotap_error::Error;
+use nanotap_fit::fit::Data;
+use nanotap_fit::fit::instrument::{self, wrapped};
 use nanotap_motions::approach::Way;
 use nanotap_motions::frequency_modulation::average::sader_jarvis;
 use nanotap_observe::frame::Frame;

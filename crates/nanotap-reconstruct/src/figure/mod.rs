@@ -1,0 +1,3 @@
+//! The figure of a recovered force.
+
+pub mod reconstruct;

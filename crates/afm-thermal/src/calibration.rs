@@ -375,6 +375,10 @@ fn fit_spectrum(
     for _ in 0..3 {
         if options.range.is_none() {
             range = default_range(oscillator, all);
+            // The fit went to a frequency that was not measured.
+            if range[0] >= range[1] {
+                return Err(none(all));
+            }
             if let Some(error) = too_few(range) {
                 return Err(error);
             }

@@ -285,10 +285,8 @@ pub(super) fn of_table(table: &Table, options: &CalibrateOptions) -> Result<Meas
         let text = options.unit.as_deref().unwrap_or(&headers[column].unit);
         let unit =
             DensityUnit::read(text).ok_or_else(|| no_density(&headers[column].name, text))?;
-        let factor = match Kind::Frequency.parse(&format!("1 {}", headers[frequency].unit)) {
-            Ok(factor) => factor,
-            Err(_) => 1.0,
-        };
+        let factor = Kind::Frequency.parse(&format!("1 {}", headers[frequency].unit));
+        let factor = factor.unwrap_or(1.0);
         let rows = rows(table, &[frequency, column])?;
         return Ok(Measurement {
             signal: Signal::Spectrum {

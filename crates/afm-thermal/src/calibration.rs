@@ -49,7 +49,7 @@ pub struct Sensitivity {
     pub relative_error: f64,
 }
 
-/// What a calibration takes besides the spectrum.
+/// Settings of a calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Temperature of the lever, K.

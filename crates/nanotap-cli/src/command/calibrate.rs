@@ -75,8 +75,8 @@ fn text(report: &CalibrateReport) -> String {
             String::new()
         }
     ));
-    text.push_str(&format!("\n{}", report.cantilever));
-    text
+    text.push('\n');
+    text + &report.cantilever
 }
 
 /// The estimates with their 95 % intervals.
@@ -164,10 +164,8 @@ fn factors(calibration: &Calibration) -> String {
             );
         }
         if let Some(reynolds) = sader.reynolds {
-            text.push_str(&format!(
-                "; Reynolds number {}",
-                number::significant(reynolds, 3)
-            ));
+            text.push_str("; Reynolds number ");
+            text.push_str(&number::significant(reynolds, 3));
         }
     }
     text

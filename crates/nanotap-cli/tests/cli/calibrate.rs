@@ -1,13 +1,11 @@
 //! `nanotap calibrate`: a lever from its thermal noise.
 
-#[path = "../../../afm-files/tests/samples/mod.rs"]
-mod samples;
-
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 use serde_json::Value;
 
+use crate::instrument_files::samples;
 use crate::util::Folder;
 
 const F0: f64 = 75e3;

@@ -1,7 +1,7 @@
 //! `nanotap files`: what the files of instruments hold.
 
 #[path = "../../../afm-files/tests/samples/mod.rs"]
-mod samples;
+pub(crate) mod samples;
 
 use serde_json::json;
 

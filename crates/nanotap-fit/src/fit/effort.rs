@@ -7,6 +7,9 @@ use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 /// Evaluations of all rows after which a fit under a nonlinear law ends.
 const EVALUATIONS: usize = 60;
 
+/// Fewest rows whose evaluations are counted: a scan over offsets takes as many orbits.
+const MIN_ROWS: usize = 36;
+
 /// Parts of a fit that may be left out.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Part {
@@ -30,13 +33,13 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// A limit of `evaluations` of all rows; default: none under a piecewise-linear law.
+    /// A limit of `evaluations` of all rows, of few rows of 36; default: none under a piecewise-linear law.
     pub(super) fn new(evaluations: Option<usize>, rows: usize, is_nonlinear: bool) -> Self {
         let default = is_nonlinear.then_some(EVALUATIONS);
         let evaluations = evaluations.or(default);
         Self {
             orbits: AtomicUsize::new(0),
-            limit: evaluations.map_or(usize::MAX, |count| count.saturating_mul(rows)),
+            limit: evaluations.map_or(usize::MAX, |count| count.saturating_mul(rows.max(MIN_ROWS))),
             left_out: AtomicU8::new(0),
         }
     }

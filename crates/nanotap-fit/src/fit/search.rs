@@ -59,6 +59,8 @@ const MIN_ROUGH: f64 = 0.01;
 const JUMPS: usize = 2;
 /// Cost of a row without an orbit in a rough fit.
 const LOST_COST: f64 = 100.0;
+/// Relative change of a standard error from one round to the next that is far from settled.
+const UNSETTLED: f64 = 0.1;
 /// Largest number of times that branches are assigned again.
 const MAX_ROUNDS: usize = 6;
 
@@ -121,7 +123,8 @@ impl<'a> Search<'a> {
                 .remedy("change the case, or give {bounds} and more {starts}")
             }
         })?;
-        let (best, rivals) = if self.request.rivals && self.describes(&best) {
+        let is_accepted = self.describes(&best) && self.is_trusted(&best);
+        let (best, rivals) = if self.request.rivals && is_accepted {
             self.rivals(best, others)
         } else {
             (best, Vec::new())
@@ -296,8 +299,15 @@ impl<'a> Search<'a> {
             }
             noise = after;
         }
-        // Noise that has not settled is that of the last residuals.
-        found.map(|found| self.with_noise(found, noise))
+        // Noise that is far from settled, as that of data without any, is that of the last residuals.
+        found.map(|found| {
+            let mut all = found.noise.iter().zip(&noise);
+            if all.all(|(a, b)| (a / b - 1.0).abs() < UNSETTLED) {
+                found
+            } else {
+                self.with_noise(found, noise)
+            }
+        })
     }
 
     /// The same fit with other standard errors of the columns that give none.

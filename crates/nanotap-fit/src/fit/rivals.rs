@@ -154,9 +154,11 @@ impl Search<'_> {
             })
         };
         let rivals = rivals.iter().filter(is_beyond);
-        rivals
+        let mut reported: Vec<Rival> = rivals
             .map(|rival| self.report_rival(found, rival))
-            .collect()
+            .collect();
+        reported.sort_by(|a, b| a.above_best.total_cmp(&b.above_best));
+        reported
     }
 
     fn report_rival(&self, found: &Found, rival: &Found) -> Rival {

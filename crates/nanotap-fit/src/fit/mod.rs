@@ -19,6 +19,10 @@
 //! A force curve is one of rests of the lever: neither its drive nor its motion counts
 //! (`problem/rest.rs`).
 //!
+//! Errors of the instrument are parameters too (`terms.rs`); those that the residuals show and that
+//! are not free are suggested (`suggestions.rs`). Other minima that describe the data about as well
+//! are searched for and reported (`rivals.rs`).
+//!
 //! Fails by stopping in a local minimum (`fits` is false then, as a warning), and where the data
 //! belong to a motion that is not periodic.
 

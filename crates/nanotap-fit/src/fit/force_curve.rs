@@ -13,7 +13,7 @@ use super::selection::{self, Contact};
 use super::solve::{LeastSquares as _, Solution};
 use nanotap_case::physical::Kind;
 use nanotap_case::under_law::LawName;
-use nanotap_case::{Case, Key};
+use nanotap_case::{Case, Key, Value};
 use nanotap_error::Error;
 
 use nanotap_motions::approach::Way;
@@ -329,7 +329,7 @@ fn summary(
         _ => contact.stiffness,
     };
     let known = |key: Key| Some(case.get(key)).filter(|value| value.is_finite());
-    let law = case.stated(Key::SampleLaw).map(nanotap_case::Value::text);
+    let law = case.stated(Key::SampleLaw).map(Value::text);
     let quantity = data.columns[0].quantity.rest();
     let attracts = case
         .cantilever()

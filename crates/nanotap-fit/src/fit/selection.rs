@@ -12,7 +12,7 @@ use super::report::FitReport;
 use super::search::Search;
 use super::{FitOptions, names};
 use nanotap_case::physical::Kind;
-use nanotap_case::{Case, Key};
+use nanotap_case::{Case, Key, Value};
 use nanotap_error::Error;
 use nanotap_model::sample_law::SampleLaw;
 use nanotap_motions::approach::Way;
@@ -64,7 +64,7 @@ pub(super) fn is_elastic(law: &str) -> bool {
 /// The segment of a force curve that is fitted where the request does not state one: the approach of an
 /// elastic law, both where a law has adhesion or losses.
 pub(super) fn default_segment(case: &Case, request: &FitOptions) -> Segment {
-    let own = case.stated(Key::SampleLaw).map(nanotap_case::Value::text);
+    let own = case.stated(Key::SampleLaw).map(Value::text);
     let mut laws = names(&request.laws);
     if laws.is_empty() {
         laws.extend(own);

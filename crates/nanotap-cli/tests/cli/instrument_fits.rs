@@ -319,7 +319,7 @@ fn what_a_file_lacks_is_asked_for() {
         csv("z (nm),defl (nm)", &SOFT.rows(200, 1.0, false)),
     );
     folder
-        .run(&["fit", "a.csv"])
+        .run(&["fit", "a.csv", "--tip-radius", "5 um"])
         .refused(&["a.csv", "spring constant", "--spring-constant"]);
     folder
         .run(&["fit", "a.csv", "--spring-constant", "0.05 N/m"])

@@ -388,7 +388,7 @@ fn with_search<R>(
         free.iter().chain(&per_curve).any(|free| free == name)
     })?;
     preparation.extend(corrected);
-    preparation.extend(selection.apply(&mut data)?);
+    preparation.extend(selection.apply(&case, &mut data)?);
     for channels in &mut channels {
         let own = data
             .curves

@@ -1,12 +1,14 @@
 //! Rows of a curve that are fitted: a segment, and ranges of rows, forces and indentations.
 //!
-//! Forces are counted from the baseline and indentations from the contact point. Both are results of
-//! a fit, so that a range of them is selected by a fit of all rows first.
+//! Forces are counted from the baseline and indentations from the contact point: first from where the
+//! rows leave the baseline, then from those of a fit, until it selects the same rows again.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::data::{Data, Row};
+use super::baseline::baseline_rows;
+use super::data::{Curve, Data, Row};
+use super::instrument::median;
 use super::quantity::RestQuantity;
 use super::report::FitReport;
 use super::search::Search;
@@ -120,6 +122,23 @@ impl Contact {
             .collect()
     }
 
+    /// The contact where the rows leave the baseline, before any fit.
+    fn rough(curve: &Curve, quantity: RestQuantity, stiffness: f64) -> Option<Self> {
+        let known = curve.rows.iter();
+        let known = known.filter_map(|row| Some((row.at[0], (*row.values.first()?)?)));
+        let (distance, values): (Vec<f64>, Vec<f64>) = known.unzip();
+        let [free, doubtful] = baseline_rows(&distance, &values);
+        let last = *doubtful.last().or(free.last())?;
+        Some(Self {
+            curve: curve.name.clone(),
+            offset: -distance[last],
+            baseline: median(free.iter().map(|row| values[*row]).collect()),
+            scale: 1.0,
+            stiffness,
+            quantity,
+        })
+    }
+
     /// Force in N and indentation in m of a row; the indentation is negative before contact.
     pub(super) fn of_row(&self, row: &Row) -> Option<[f64; 2]> {
         let value = ((*row.values.first()?)? - self.baseline) / self.scale;
@@ -194,7 +213,7 @@ impl Range {
     fn has(&self, row: &Row, contact: Option<&Contact>) -> bool {
         let value = match (self.of, contact) {
             (Ranged::Rows, _) => Some(row.line as f64),
-            // Before the first fit.
+            // Without a baseline.
             (_, None) => return true,
             (Ranged::Force, Some(contact)) => contact.of_row(row).map(|[force, _]| force),
             (Ranged::Indentation, Some(contact)) => contact.of_row(row).map(|[_, depth]| depth),
@@ -253,7 +272,7 @@ impl Selection {
     ///
     /// # Errors
     /// If no row is left, or a segment is selected and the rows do not say to which they belong.
-    pub(super) fn apply(&self, data: &mut Data) -> Result<Vec<String>, Error> {
+    pub(super) fn apply(&self, case: &Case, data: &mut Data) -> Result<Vec<String>, Error> {
         let is_force_curve = data.is_force_curve();
         if !is_force_curve && self.needs_contact() {
             return Err(Error::option(
@@ -294,8 +313,15 @@ impl Selection {
             return Ok(notes);
         }
         let before = data.rows().count();
+        let mut contacts = self.contacts.clone();
+        let quantity = data.columns.first().and_then(|c| c.quantity.rest());
+        if let (true, Some(quantity)) = (contacts.is_empty() && self.needs_contact(), quantity) {
+            let k = case.get(Key::LeverK);
+            let curves = data.curves.iter();
+            contacts.extend(curves.filter_map(|curve| Contact::rough(curve, quantity, k)));
+        }
         data.retain(|curve, row| {
-            let contact = self.contacts.iter().find(|contact| contact.curve == curve);
+            let contact = contacts.iter().find(|contact| contact.curve == curve);
             self.ranges.iter().all(|range| range.has(row, contact))
         });
         let after = data.rows().count();

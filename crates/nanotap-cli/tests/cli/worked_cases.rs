@@ -222,7 +222,7 @@ macro_rules! follows {
 }
 
 follows! {
-    fit: "fit.md", 9 commands, 52 numbers;
+    fit: "fit.md", 10 commands, 61 numbers;
     fit_of_sticky_and_wet_samples: "fit-adhesion.md", 2 commands, 10 numbers;
     fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
     frequency_modulation: "frequency-modulation.md", 3 commands, 23 numbers;

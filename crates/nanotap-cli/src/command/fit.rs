@@ -1,5 +1,6 @@
 //! `nanotap fit`: parameters of lever and sample from measured curves.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -274,7 +275,7 @@ fn plus_minus(kind: Kind, value: f64, error: Option<f64>) -> String {
     let Some(error) = error.filter(|error| *error > 0.0) else {
         return kind.format_digits(value, 5);
     };
-    let digits = (value.abs() / error).log10().ceil() + 2.0;
+    let digits = nanotap_arithmetic::log10(value.abs() / error).ceil() + 2.0;
     let value = kind.format_digits(value, digits.clamp(3.0, 12.0) as usize);
     format!("{value} ± {}", kind.format_digits(error, 2))
 }
@@ -390,7 +391,7 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
     }
     for of in &report.force_curves {
         if report.force_curves.len() > 1 {
-            text.push_str(&format!("{}\n", style::bold(&of.curve)));
+            let _ = writeln!(text, "{}", style::bold(&of.curve));
         }
         text.push_str(&force_curve(of));
     }

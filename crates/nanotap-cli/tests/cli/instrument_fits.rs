@@ -4,9 +4,6 @@
 //! repository: each source package is downloaded once, and its files are skipped with a message where
 //! that fails.
 
-#[path = "../../../afm-files/tests/samples/mod.rs"]
-mod samples;
-
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,6 +11,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::instrument_files::samples;
 use crate::util::Folder;
 
 /// The unpacked source package; `None` if it cannot be downloaded.

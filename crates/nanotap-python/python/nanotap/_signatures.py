@@ -625,9 +625,9 @@ def fit(
     jumps: bool = True,
     phase: float = 90.0,
     profile: bool = True,
-    curve: int | None = None,
     rivals: bool = True,
     evaluations: int | None = None,
+    curve: int | None = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Fit:
@@ -643,12 +643,10 @@ def fit(
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
     free : Sequence[str] | None
-        Parameters to find: keys of the case, gap.offset, and NAME.offset or
-        NAME.scale of a column; default for a force curve: modulus, contact point,
-        baseline, and the adhesion of the law.
         Parameters to find: keys of the case, gap.offset, NAME.offset or NAME.scale
         of a column, and terms of the instrument: NAME.tilt, NAME.curvature,
-        NAME.interference, NAME.drag, gap.drift, gap.backlash.
+        NAME.interference, NAME.drag, gap.drift, gap.backlash; default for a force
+        curve: modulus, contact point, baseline, and the adhesion of the law.
     per_curve : Sequence[str] | None
         Parameters to find with one value per curve.
     convert : Sequence[str] | None
@@ -698,14 +696,14 @@ def fit(
         shift.
     profile : bool
         Intervals from the profile of the likelihood.
-    curve : int | None
-        Number of the curve of an instrument's file with several, from 0; default:
-        the first.
     rivals : bool
         Search for other minima that describe the data about as well.
     evaluations : int | None
         Evaluations of the whole curve after which the search ends with what is
         known; default: 60 under a nonlinear law, else no limit (1 to 1000000).
+    curve : int | None
+        Number of the curve of an instrument's file with several, from 0; default:
+        the first.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress

@@ -202,12 +202,17 @@ fn map_text(report: &FitMapReport) -> String {
     format!(
         "{}\n{}",
         motion::paragraph(&format!(
-            "{} fitted: {} described, {} not described, {} without a result; the table is of those \
-             described",
+            "{} fitted: {} described, {} not described, {} without a result; the table is of {}",
             number::counted(report.pixels, "pixel", "pixels"),
             report.fits,
             report.misfits,
-            report.failed
+            report.failed,
+            if report.over_misfits {
+                "all with a result: where most curves are not described to their noise, the law is an \
+                 approximation everywhere"
+            } else {
+                "those described"
+            }
         )),
         table.render()
     )

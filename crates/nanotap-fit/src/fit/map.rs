@@ -87,7 +87,10 @@ pub struct FitMapReport {
     pub misfits: usize,
     /// Number of pixels for which the fit has no result.
     pub failed: usize,
-    /// The free parameters, each over the pixels whose curve is described.
+    /// Whether the parameters are over the pixels whose curve is not described, too: where these are the
+    /// most, as on cells, a law is an approximation everywhere.
+    pub over_misfits: bool,
+    /// The free parameters, each over the pixels whose curve is described; see `over_misfits`.
     pub parameters: Vec<MappedParameter>,
 }
 
@@ -98,7 +101,7 @@ pub struct MappedParameter {
     pub key: String,
     /// Unit of the values in SI, `1` if there is none.
     pub unit: String,
-    /// Median over the pixels whose curve is described, in `unit`; None if there are none.
+    /// Median over these pixels, in `unit`; None if there are none.
     pub median: Option<f64>,
     /// Quantiles of 5 % and 95 % over these pixels, in `unit`.
     pub range: [Option<f64>; 2],
@@ -120,11 +123,13 @@ impl FitMapReport {
         let column = |name: &str| schema.index_of(name).map(|k| &columns[k][..]);
         let results = column(RESULT).unwrap_or_default();
         let count = |code: f64| results.iter().filter(|result| **result == code).count();
+        let over_misfits = count(1.0) < count(2.0);
+        let counts = |result: f64| result == 1.0 || over_misfits && result == 2.0;
         let parameters = schema.variables.iter().filter_map(|variable| {
             let errors = column(&error_of(&variable.name))?;
             let fitted = |values: &[f64]| -> Vec<f64> {
                 let both = values.iter().zip(results);
-                let kept = both.filter(|(value, result)| value.is_finite() && **result == 1.0);
+                let kept = both.filter(|(value, result)| value.is_finite() && counts(**result));
                 let mut kept: Vec<f64> = kept.map(|(value, _)| *value).collect();
                 kept.sort_by(f64::total_cmp);
                 kept
@@ -147,6 +152,7 @@ impl FitMapReport {
             fits: count(1.0),
             misfits: count(2.0),
             failed: count(3.0),
+            over_misfits,
             parameters: parameters.collect(),
         })
     }

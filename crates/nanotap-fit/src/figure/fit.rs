@@ -36,11 +36,11 @@ impl MappedColumn {
         self.values.iter().map(|value| value.unwrap_or(f64::NAN))
     }
 
-    fn axis(&self) -> Axis {
-        match self.units.as_str() {
-            "1" => Axis::linear(&self.name),
-            units => Axis::linear(format!("{} ({units})", self.name)),
-        }
+    /// The values as they are drawn, and their axis.
+    fn drawn(&self) -> (Vec<f64>, Axis) {
+        let (factor, title) = self.shown();
+        let values = self.numbers().map(|value| factor * value).collect();
+        (values, Axis::linear(title))
     }
 
     /// What multiplies the values where they are drawn, and the title with the unit.
@@ -48,7 +48,7 @@ impl MappedColumn {
         let finite = self.numbers().filter(|value| value.is_finite());
         let size = finite.fold(0.0, |m: f64, v| m.max(v.abs()));
         let kind = Key::find(&self.name).map(Key::kind);
-        let kind = kind.or_else(|| (self.units == "m").then_some(Kind::Length));
+        let kind = kind.or_else(|| Kind::of_si_unit(&self.units));
         let (factor, unit) = match kind {
             Some(kind) if kind != Kind::Number => prefixed(kind, 1.0, size),
             _ => (1.0, self.units.clone()),
@@ -133,27 +133,19 @@ impl FitMaps {
             _ => [y.values.len(), x.values.len()],
         };
         self.maps.iter().fold(figure, |figure, map| {
-            let (factor, title) = map.shown();
-            let scaled = map.numbers().map(|value| factor * value);
+            let (scaled, scale) = map.drawn();
+            let ((along, x_axis), (across, y_axis)) = (x.drawn(), y.drawn());
             figure.with(if rows == 1 {
-                Panel::new(x.axis(), Axis::linear(title))
-                    .with(Markers::new(x.numbers().zip(scaled)).colour(Colour::BLUE))
+                let points = along.into_iter().zip(scaled);
+                Panel::new(x_axis, scale).with(Markers::new(points).colour(Colour::BLUE))
             } else {
-                let edges = |axis: &MappedColumn| {
-                    let at: Vec<f64> = axis.numbers().collect();
+                let edges = |at: Vec<f64>| {
                     let [first, last] = [at.first(), at.last()].map(|end| *end.unwrap_or(&0.0));
                     let half = 0.5 * (last - first) / (at.len() - 1).max(1) as f64;
                     (first - half, last + half)
                 };
-                let scale = Axis::linear(title);
-                Panel::new(x.axis().tight(), y.axis().tight()).with(Heatmap::new(
-                    columns,
-                    rows,
-                    scaled,
-                    edges(x),
-                    edges(y),
-                    scale,
-                ))
+                let map = Heatmap::new(columns, rows, scaled, edges(along), edges(across), scale);
+                Panel::new(x_axis.tight(), y_axis.tight()).with(map)
             })
         })
     }

@@ -90,9 +90,7 @@ fn follow(name: &str) -> (usize, usize) {
     let (mut commands, mut numbers) = (0, 0);
     let mut said = Value::Null;
     let mut last = String::new();
-    for (command, shown) in crate::front_page::examples(&text) {
-        crate::front_page::prints(&folder, command, &shown);
-    }
+    let examples = crate::front_page::examples(&text);
     for line in text.lines() {
         if let Some(command) = line.strip_prefix("$ nanotap ") {
             let mut arguments = words(command);
@@ -102,6 +100,10 @@ fn follow(name: &str) -> (usize, usize) {
             let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
             said = folder.run(&arguments).json();
             command.clone_into(&mut last);
+            // After the commands before it, whose files it may read.
+            for (_, shown) in examples.iter().filter(|(of, _)| *of == command) {
+                crate::front_page::prints(&folder, command, shown);
+            }
             commands += 1;
             // Figures that the document mentions are drawn.
             if let Some(k) = arguments.iter().position(|a| *a == "--plot") {

@@ -651,7 +651,7 @@ impl Case {
     /// these values; `None` if the units do not depend on the key.
     ///
     /// # Errors
-    /// When the case is not valid beside the value.
+    /// When the case is not valid at a neighbouring value.
     pub fn scales_beside(&self, key: Key) -> Result<Option<(Scales, Scales, f64)>, CaseError> {
         let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(None);

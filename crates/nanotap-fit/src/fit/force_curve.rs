@@ -140,7 +140,7 @@ pub(super) fn compared_by_force(search: &Search<'_>, report: FitReport) -> FitRe
     );
     FitReport {
         preparation,
-        // How large the residuals are is said in terms of the noise.
+        // The remarks state the size of the residuals in terms of the noise.
         remarks: report.remarks,
         misfit: true,
         ..again

@@ -167,7 +167,7 @@ fn error_of(key: &str) -> String {
     format!("{key}_error")
 }
 
-/// What a map of force curves has beside the parameters, with its unit in SI.
+/// What a map of force curves has in addition to the parameters, with its unit in SI.
 pub(crate) const OF_FORCES: [(&str, &str, &str); 3] = [
     (
         "contact_point",

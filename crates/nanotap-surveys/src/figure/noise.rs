@@ -20,7 +20,7 @@ pub fn noise_figure(report: &NoiseReport) -> Figure {
     };
     let free = &report.spectrum;
     let reading = &report.reading_spectrum;
-    let beside = || Axis::log("distance from the drive's frequency (Hz)").tight();
+    let around = || Axis::log("distance from the drive's frequency (Hz)").tight();
     let (picometres, kilohertz) = (1e12, 1e-3);
     Figure::new(1, 3)
         .width(DOUBLE_COLUMN)
@@ -31,12 +31,12 @@ pub fn noise_figure(report: &NoiseReport) -> Figure {
             roots(&free.frequency, kilohertz, &free.density, picometres),
         ))
         .with(panel(
-            beside(),
+            around(),
             "amplitude noise (pm/√Hz)",
             roots(&reading.frequency, 1.0, &reading.amplitude, picometres),
         ))
         .with(panel(
-            beside(),
+            around(),
             "phase noise (°/√Hz)",
             roots(&reading.frequency, 1.0, &reading.phase, 1.0),
         ))

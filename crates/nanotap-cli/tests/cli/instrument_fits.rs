@@ -189,7 +189,7 @@ fn errors(found: &Value, of: &Hertz) -> [f64; 2] {
 fn any_height_direction_and_baseline_gives_the_modulus() {
     let folder = Folder::new();
     let lever = ["--spring-constant", "0.05 N/m", "--tip-radius", "5 um"];
-    // The distance shrinks or grows towards the sample; without a column `direction` both ways are found
+    // The distance shrinks or grows towards the sample; without a column `direction` the ways are known
     // by the turning point, and the approach is fitted.
     for (name, towards, header) in [
         ("down.csv", 1.0, "height (nm),defl (nm)"),

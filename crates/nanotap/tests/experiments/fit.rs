@@ -1399,6 +1399,8 @@ fn an_instruments_export_is_fitted_as_it_is() {
     let start = case(ATTRACTING, &["sample.modulus=1 GPa"]);
     let guessed = FitOptions {
         convert: vec!["Amp=58 nm/V".into()],
+        // Intervals are followed to their ends.
+        evaluations: Some(1000),
         ..request(vec![table.clone()], &["sample.modulus", "gap.offset"])
     };
     let stated = FitOptions {

@@ -189,6 +189,7 @@ impl Table {
         let mut commas = Commas::default();
         let mut units = None;
         let mut rows = 0;
+        let mut lines = Vec::new();
         while reader
             .read_record(&mut record)
             .map_err(|error| refuse(&error))?
@@ -197,6 +198,7 @@ impl Table {
                 units = Some(record.clone());
             } else {
                 record.iter().for_each(|field| commas.see(field));
+                lines.push(record.position().map_or(0, csv::Position::line));
             }
             rows += 1;
             if rows * header.len() > MAX_ENTRIES {
@@ -223,7 +225,7 @@ impl Table {
         let mut table = Self {
             name: name.to_owned(),
             columns: named.collect(),
-            lines: Vec::with_capacity(rows),
+            lines,
             ..Self::default()
         };
         let has_commas = commas.are_decimal(separator);
@@ -241,8 +243,6 @@ impl Table {
             if std::mem::take(&mut skip) {
                 continue;
             }
-            let line = record.position().map_or(0, csv::Position::line);
-            table.lines.push(line + first.line() - 1);
             for ((_, column), field) in table.columns.iter_mut().zip(&record) {
                 let number = decimal(field).filter(|_| has_commas && field.contains(','));
                 column.push(number.map_or_else(|| Entry::of(field), Entry::Number));

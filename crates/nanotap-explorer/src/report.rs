@@ -207,10 +207,12 @@ mod tests {
     fn a_document_becomes_tables_with_units_from_its_schema() {
         let schema = json!({
             "properties": {
-                "free": { "description": "Free amplitude, m." },
+                "free": { "description": "Free amplitude, m.", "x-unit": "m" },
                 "rows": { "description": "The rows.", "items": { "$ref": "#/$defs/Row" } },
             },
-            "$defs": { "Row": { "properties": { "k": { "description": "Stiffness in N/m. More." } } } },
+            "$defs": { "Row": { "properties": {
+                "k": { "description": "Stiffness in N/m. More.", "x-unit": "N/m" },
+            } } },
         });
         let document = json!({
             "free": 1e-8, "verdict": "good", "case": {}, "many": vec![0; 20],

@@ -148,6 +148,7 @@ fn every_document_has_a_test() {
             "beam.md",
             "bimodal.md",
             "bistable.md",
+            "calibrate.md",
             "capillary.md",
             "contact.md",
             "dforce.md",
@@ -232,6 +233,7 @@ follows! {
     the_theory_of_the_observables: "observables.md", 1 commands, 3 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
     the_bistable_lever: "bistable.md", 3 commands, 13 numbers;
+    the_thermal_calibration: "calibrate.md", 2 commands, 10 numbers;
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;

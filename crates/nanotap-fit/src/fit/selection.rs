@@ -193,6 +193,14 @@ impl Range {
             }
         };
         let read = |end: &str| {
+            let is_bare = end.trim().parse().is_ok_and(|value: f64| value != 0.0);
+            if kind != Kind::Number && is_bare {
+                return Err(Error::option(
+                    "range",
+                    format!("{}: `{end}` has no unit", given.name),
+                    format!("write both ends as in \"{}\"", kind.example()),
+                ));
+            }
             let read = kind.parse(end);
             read.map_err(|error| {
                 let what = format!("{}: {error}", given.name);

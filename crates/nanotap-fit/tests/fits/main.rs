@@ -8,7 +8,7 @@ use nanotap_case::Case;
 use nanotap_case::file::Source;
 use nanotap_case::table::{Entry, Table};
 use nanotap_dynamics::Control;
-use nanotap_fit::fit::{FitOptions, FitReport, FittedParameter, fit};
+use nanotap_fit::fit::{FitOptions, FitReport, FittedParameter, Segment, fit};
 use nanotap_motions::approach::{ApproachOptions, Way, approach};
 
 /// Normal deviates (SplitMix64; Box and Muller).
@@ -86,6 +86,8 @@ fn options(table: Table, free: &[&str]) -> FitOptions {
         free: free.iter().map(|name| (*name).to_owned()).collect(),
         profile: false,
         rivals: false,
+        // Under an elastic law, too, both ways are compared.
+        segment: Some(Segment::Both),
         ..FitOptions::default()
     }
 }

@@ -14,7 +14,7 @@ Point:\t1
 X, nm:\t{x}
 Y, nm:\t250
 Force Constant, nN/nm:\t0.5
-  Extend Z-Sense(nm),Extend Force(nN),Retract Z-Sense(nm),Retract Force(nN)
+Extend Z-Sense(nm),Extend Force(nN),Retract Z-Sense(nm),Retract Force(nN)
 {rows}
 """
 

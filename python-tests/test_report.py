@@ -42,7 +42,7 @@ STUDIES = [
     ("lyapunov", "stiff-lever.toml", {}, {"periods": 60, "transient": 20}, True),
     ("convergence", "paper.toml", REGULAR, {"largest": 2}, True),
     ("convergence", "stiff-lever.toml", {}, {"largest": 2}, True),
-    ("noise", "dforce-dmt.toml", {}, {}, False),
+    ("noise", "dforce-dmt.toml", {}, {}, True),
     ("contact_laws", "dforce-dmt.toml", {}, {}, True),
     ("bimodal", "bimodal-polymer.toml", {}, {"points": 3}, True),
     ("scan", "scan-step.toml", {}, {"lines": 1, "size": "20 nm"}, True),

@@ -42,6 +42,7 @@ ARGUMENTS = {
 # They need measured data, a table [scan], a second tone, or no case.
 ELSEWHERE = {
     "bimodal",
+    "calibrate",
     "fit",
     "fit_map",
     "reconstruct",

@@ -198,7 +198,10 @@ impl Table {
                 units = Some(record.clone());
             } else {
                 record.iter().for_each(|field| commas.see(field));
-                lines.push(record.position().map_or(0, csv::Position::line));
+                // The position of the record itself is that of a comment before it.
+                let end = reader.position();
+                let is_ended = content[..end.byte() as usize].ends_with(b"\n");
+                lines.push(end.line() - u64::from(is_ended));
             }
             rows += 1;
             if rows * header.len() > MAX_ENTRIES {

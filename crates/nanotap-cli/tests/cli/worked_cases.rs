@@ -177,6 +177,7 @@ fn every_document_has_a_test() {
             "reconstruct.md",
             "samples.md",
             "scan.md",
+            "scan.md",
             "stiff-lever.md",
             "table.md",
             "tip-mass.md",

@@ -54,7 +54,7 @@ fn forget(target: &Path) {
     for crate_ in unpacked.flatten().flatten() {
         let name = crate_.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with("nanotap") || name.starts_with("afm-files") {
+        if name.starts_with("nanotap") || name.starts_with("afm-") {
             let _ = fs::remove_dir_all(crate_.path());
         }
     }

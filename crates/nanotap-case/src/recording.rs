@@ -80,23 +80,31 @@ pub(super) fn parse(
     if let (None, Some(kind)) = (recognise(&bytes), kind(name)) {
         return Err(RecordingError::Other(kind));
     }
-    of_document(&afm_files::read(bytes)?, number)
+    let document = afm_files::read(bytes)?;
+    let mut recording = of_document(&document, number.unwrap_or(0))?;
+    let count = document.curve_count();
+    if count > 1 {
+        let which = number.map_or_else(
+            || "the first of its".to_owned(),
+            |number| format!("curve {number} (from 0) of its"),
+        );
+        recording.remarks.push(format!(
+            "{which} {count} curves is read; the option `curve` selects one"
+        ));
+    }
+    Ok(recording)
 }
 
-/// A curve of a file that is open, by its number from 0; without one the first.
-pub(super) fn of_document(
-    document: &Document,
-    number: Option<usize>,
-) -> Result<Recording, RecordingError> {
-    let count = document.curve_count();
-    if count == 0 {
+/// A curve of a file that is open, by its number from 0.
+pub(super) fn of_document(document: &Document, number: usize) -> Result<Recording, RecordingError> {
+    if document.curve_count() == 0 {
         return Err(RecordingError::NoCurve {
             format: document.format,
             images: document.images.len(),
             spectra: document.spectra.len(),
         });
     }
-    let curve = document.curve(number.unwrap_or(0))?;
+    let curve = document.curve(number)?;
     let segments = curve.segments.iter();
     let numbers = segments.map(|of| of.points() * of.channels.len()).sum();
     if numbers > MAX_NUMBERS {
@@ -109,15 +117,6 @@ pub(super) fn of_document(
     }
     recording.notes = notes(document, &curve);
     recording.remarks.extend(curve.notes);
-    if count > 1 {
-        let which = number.map_or_else(
-            || "the first of its".to_owned(),
-            |number| format!("curve {number} (from 0) of its"),
-        );
-        recording.remarks.push(format!(
-            "{which} {count} curves is read; the option `curve` selects one"
-        ));
-    }
     Ok(recording)
 }
 

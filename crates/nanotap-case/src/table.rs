@@ -75,11 +75,19 @@ impl Table {
         curve: Option<usize>,
     ) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let bytes = input::read(path, MAX_TABLE_BYTES, origin)?;
-        if recording::is_recording(&name, &bytes) {
-            let recorded = recording::parse(&name, bytes, curve);
+        Self::of_bytes(&name, input::read(path, MAX_TABLE_BYTES, origin)?, curve)
+    }
+
+    /// As [`read`](Self::read), of a file's content; of an instrument's file the curve of this number, from
+    /// 0, or the first.
+    ///
+    /// # Errors
+    /// As [`read_curve`](Self::read_curve).
+    pub fn of_bytes(name: &str, bytes: Vec<u8>, curve: Option<usize>) -> Result<Self, Error> {
+        if recording::is_recording(name, &bytes) {
+            let recorded = recording::parse(name, bytes, curve);
             return recorded
-                .map(|recorded| Self::of_recording(&name, recorded))
+                .map(|recorded| Self::of_recording(name, recorded))
                 .map_err(|error| {
                     Error::input(
                         format!("{name}: {error}"),
@@ -100,7 +108,7 @@ impl Table {
                 "export the curve as text, with the names of the columns in the first line",
             )
         })?;
-        Self::parse(&name, &text)
+        Self::parse(name, &text)
     }
 
     /// The curve of this number, from 0, of an instrument's file that is open under this name.
@@ -108,12 +116,10 @@ impl Table {
     /// # Errors
     /// If there is no such curve, it is damaged, or it has no complete row.
     pub fn of_document(name: &str, document: &Document, number: usize) -> Result<Self, Error> {
-        let mut recorded = recording::of_document(document, Some(number)).map_err(|error| {
+        let recorded = recording::of_document(document, number).map_err(|error| {
             let message = format!("{name}, curve {number}: {error}");
             Error::input(message, "`nanotap files` lists what a file holds")
         })?;
-        // That others are read, too, is known.
-        recorded.remarks.pop();
         Ok(Self::of_recording(name, recorded))
     }
 
@@ -148,8 +154,21 @@ impl Table {
         } else {
             Cow::Borrowed(text)
         };
-        let separator = delimiter(text);
-        let content = text.trim_start_matches('\u{feff}').as_bytes();
+        let text = text.trim_start_matches('\u{feff}');
+        let Head { separator, skipped } = Head::of(text);
+        let before: usize = text.split_inclusive('\n').take(skipped).map(str::len).sum();
+        let content = text.as_bytes().get(before..).unwrap_or_default();
+        // A last line without an end may be cut within a number.
+        let is_cut = |error: &csv::Error| {
+            let at = error.position().map_or(0, |at| at.byte() as usize);
+            let is_short = match error.kind() {
+                csv::ErrorKind::UnequalLengths {
+                    expected_len, len, ..
+                } => len < expected_len,
+                _ => false,
+            };
+            is_short && !content.get(at..).unwrap_or_default().contains(&b'\n')
+        };
         let mut configured = csv::ReaderBuilder::new();
         configured
             .comment(Some(b'#'))
@@ -157,7 +176,7 @@ impl Table {
             .delimiter(separator);
         let mut reader = configured.from_reader(content);
         let refuse = |error: &csv::Error| {
-            let line = error.position().map_or(1, csv::Position::line);
+            let line = error.position().map_or(1, csv::Position::line) + skipped as u64;
             let what = match error.kind() {
                 csv::ErrorKind::UnequalLengths {
                     expected_len, len, ..
@@ -190,10 +209,22 @@ impl Table {
         let mut units = None;
         let mut rows = 0;
         let mut lines = Vec::new();
-        while reader
-            .read_record(&mut record)
-            .map_err(|error| refuse(&error))?
-        {
+        let mut remarks = Vec::new();
+        if skipped > 0 {
+            remarks.push(format!(
+                "lines before the names of the columns, left out: {skipped}"
+            ));
+        }
+        loop {
+            match reader.read_record(&mut record) {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) if is_cut(&error) => {
+                    remarks.push("the last line is cut off and left out".to_owned());
+                    break;
+                }
+                Err(error) => return Err(refuse(&error)),
+            }
             if rows == 0 && is_units(&record) {
                 units = Some(record.clone());
             } else {
@@ -201,7 +232,7 @@ impl Table {
                 // The position of the record itself is that of a comment before it.
                 let end = reader.position();
                 let is_ended = content[..end.byte() as usize].ends_with(b"\n");
-                lines.push(end.line() - u64::from(is_ended));
+                lines.push(end.line() - u64::from(is_ended) + skipped as u64);
             }
             rows += 1;
             if rows * header.len() > MAX_ENTRIES {
@@ -229,6 +260,7 @@ impl Table {
             name: name.to_owned(),
             columns: named.collect(),
             lines,
+            remarks,
             ..Self::default()
         };
         let has_commas = commas.are_decimal(separator);
@@ -238,12 +270,11 @@ impl Table {
         }
         let rest = &content[first.byte() as usize..];
         let mut reader = configured.has_headers(false).from_reader(rest);
-        let mut skip = units.is_some();
-        while reader
-            .read_record(&mut record)
-            .map_err(|error| refuse(&error))?
-        {
-            if std::mem::take(&mut skip) {
+        for row in 0..rows + usize::from(units.is_some()) {
+            reader
+                .read_record(&mut record)
+                .map_err(|error| refuse(&error))?;
+            if row == 0 && units.is_some() {
                 continue;
             }
             for ((_, column), field) in table.columns.iter_mut().zip(&record) {
@@ -444,16 +475,76 @@ fn is_units(row: &csv::StringRecord) -> bool {
     row.iter().all(|field| decimal(field).is_none()) && fields.any(is_known)
 }
 
-/// Separator of the fields: comma, semicolon or tab, whichever occurs most often in the header.
-fn delimiter(text: &str) -> u8 {
-    let header = text
-        .lines()
-        .find(|line| !line.starts_with('#') && !line.trim().is_empty());
-    let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
-    [b'\t', b';', b',']
-        .into_iter()
-        .max_by_key(|mark| count(*mark))
-        .unwrap_or(b',')
+/// Where a text has the names of its columns, and what separates its fields.
+struct Head {
+    separator: u8,
+    /// Lines before the names.
+    skipped: usize,
+}
+
+/// Separators of fields.
+const SEPARATORS: [u8; 3] = *b"\t;,";
+/// Most lines before the names of the columns.
+const MAX_HEAD: usize = 200;
+
+impl Head {
+    /// Excel states the separator in a line of its own, `sep=;`. The names are in the first line that is no
+    /// comment, unless the numbers have another number of fields: then in the line before them, or, with
+    /// units, in the one before that.
+    fn of(text: &str) -> Self {
+        let lines = text.lines().take(MAX_HEAD).enumerate();
+        let mut lines = lines
+            .filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty())
+            .peekable();
+        let stated = lines.next_if(|(_, line)| stated_separator(line).is_some());
+        let skipped = stated.map_or(0, |(line, _)| line + 1);
+        let stated = stated.and_then(|(_, line)| stated_separator(line));
+        let lines: Vec<(usize, &str)> = lines.collect();
+        // The most frequent one in the first line.
+        let count = |mark: &u8| {
+            let first = lines.first().map_or("", |(_, line)| line);
+            first.bytes().filter(|b| b == mark).count()
+        };
+        let separator = stated.or_else(|| SEPARATORS.into_iter().max_by_key(count));
+        let separator = separator.unwrap_or(b',');
+        let others: Vec<u8> = stated.map_or_else(|| SEPARATORS.to_vec(), |stated| vec![stated]);
+        let names = |separator: &u8| Some((names(&lines, *separator)?, *separator));
+        match others.iter().find_map(names) {
+            Some((0, _)) | None => Self { separator, skipped },
+            Some((at, separator)) => Self {
+                separator,
+                skipped: lines[at].0,
+            },
+        }
+    }
+}
+
+/// The separator that a line states for Excel.
+fn stated_separator(line: &str) -> Option<u8> {
+    let line = line
+        .trim_start()
+        .trim_end_matches([' ', '\r'])
+        .trim_matches('"');
+    let (word, mark) = line.split_at_checked(4)?;
+    let is_one = word.eq_ignore_ascii_case("sep=") && mark.len() == 1;
+    is_one.then(|| mark.as_bytes()[0])
+}
+
+/// The line, by its index, that names the columns: above the first numbers, and above their units, among the
+/// last lines with one number of fields. The very last may be cut.
+fn names(lines: &[(usize, &str)], separator: u8) -> Option<usize> {
+    let fields = |(_, line): &(usize, &str)| -> csv::StringRecord {
+        line.split(char::from(separator)).map(str::trim).collect()
+    };
+    let whole = &lines[..lines.len().checked_sub(1)?];
+    let count = fields(whole.last()?).len();
+    let other = whole.iter().rposition(|line| fields(line).len() != count);
+    let begin = other.map_or(0, |other| other + 1);
+    let has_numbers = |line| fields(line).iter().any(|field| decimal(field).is_some());
+    let first = begin + lines[begin..].iter().position(has_numbers)?;
+    let has_units = first >= begin + 2 && is_units(&fields(&lines[first - 1]));
+    let names = first.checked_sub(1 + usize::from(has_units))?;
+    (count > 1 && names >= begin).then_some(names)
 }
 
 impl Serialize for Table {
@@ -542,6 +633,34 @@ mod tests {
         assert_eq!(table.lines, [4, 6]);
         let error = Table::parse("t", "z,d\n1,2\n3\n").unwrap_err();
         assert!(error.message().contains("line 3"), "{}", error.message());
+    }
+
+    #[test]
+    fn what_programs_write_above_the_names_is_left_out() {
+        let text = "sep=;\r\nz (nm);d (nm)\r\n1,5;2\r\n";
+        let table = Table::parse("t", text).unwrap();
+        assert_eq!(
+            table.columns[0],
+            ("z (nm)".to_owned(), vec![Entry::Number(1.5)])
+        );
+        assert_eq!(table.lines, [3]);
+        let text = "Instrument: A, B\nDate: 1.2.2020\n\nHöhe;Kraft\nnm;nN\n1,5;2\n2,5;3\n";
+        let table = Table::parse("t", text).unwrap();
+        assert_eq!(table.columns[1].0, "Kraft (nN)");
+        assert_eq!(table.columns[0].1, [Entry::Number(1.5), Entry::Number(2.5)]);
+        assert_eq!(table.lines, [6, 7]);
+        assert_eq!(table.remarks.len(), 1);
+        let error = Table::parse("t", "Operator;Max\nz;d\n1;2\n3\n4;5\n").unwrap_err();
+        assert!(error.message().contains("line 4"), "{}", error.message());
+    }
+
+    #[test]
+    fn a_last_line_that_is_cut_off_is_left_out() {
+        let table = Table::parse("t", "z,d\n1,2\n3").unwrap();
+        assert_eq!(table.columns[1].1, [Entry::Number(2.0)]);
+        assert!(table.remarks[0].contains("cut off"), "{:?}", table.remarks);
+        // A line that has its end is not cut off.
+        assert!(Table::parse("t", "z,d\n1,2\n3\n").is_err());
     }
 
     #[test]

@@ -22,10 +22,10 @@ const HINTS = {
   map: "The kinds of motion, the peak force, or the number of motions over two parameters.",
   image: "A line of an image under feedback: height, amplitude error, phase and peak force over a known surface.",
   levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row chooses that lever.",
-  data: "A measured curve over that of the model, the fit of the model to it, and its force without a contact law. Drop a CSV file on the page, or choose one; its columns are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
+  data: "A measured curve over that of the model, the fit of the model to it, and its force without a contact law. Drop an instrument’s file (JPK, Bruker, Asylum, Nanosurf …) or a CSV file on the page, or choose one; columns of a CSV file are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
   plan: "Where every motion meets the conditions, over free amplitude and setpoint: the window for imaging.",
 };
-const MOST_DATA = 1.5e6;      // bytes of a measured file
+const MOST_DATA = 24e6;       // bytes of a measured file
 const COLUMNS = 64;           // heights of a surface that is drawn by hand
 const LINE = 6000;            // milliseconds in which the tip goes along the line of an image
 const FIRST = 5;              // fields of a form that are shown at once, if it has more than one in addition
@@ -35,7 +35,7 @@ const OTHER = "computed for other values – compute again";
 const PLAIN = {};             // studies that the page knows from the registry only: name -> what they are about
 let plain = {};               // their forms
 let forms = null;
-let measured = null;          // name and text of the measured file
+let measured = null;          // name and content of the measured file
 let found = null;             // the case of a fit
 let filled = "";              // the form that is shown
 let drawn = null;             // what the displayed figure is of, and where its clicks go
@@ -114,12 +114,20 @@ function choose(name) {
   if (motion) fill(motion);
 }
 
+/** The bytes of a file in base64. */
+const base64Of = (file) => new Promise((done, failed) => {
+  const reader = new FileReader();
+  reader.addEventListener("load", () => done(reader.result.slice(reader.result.indexOf(",") + 1)));
+  reader.addEventListener("error", () => failed(reader.error));
+  reader.readAsDataURL(file);
+});
+
 /** Takes a measured file. */
 async function take(file) {
   if (!file) return;
   if (state.tab !== "data") choose("data");
   if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page reads at most ${MOST_DATA}, the terminal more`; return; }
-  measured = [file.name, await file.text()];
+  measured = [file.name, { base64: await base64Of(file) }];
   filled = "";
   if (motion) fill(motion);
   compute(false);
@@ -254,7 +262,7 @@ function build() {
     return made;
   };
   if (state.tab === "data") {
-    const file = Object.assign(document.createElement("input"), { type: "file", accept: ".csv,.txt,.tsv" });
+    const file = Object.assign(document.createElement("input"), { type: "file" });
     file.addEventListener("change", () => take(file.files[0]));
     const label = document.createElement("label");
     label.append(measured ? `${measured[0]} ` : "measured file ", file);

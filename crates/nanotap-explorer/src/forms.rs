@@ -229,9 +229,19 @@ fn levers(setpoint: Option<&Stated>, conditions: Vec<Value>) -> Vec<Value> {
     [own, conditions].concat()
 }
 
-/// The fields of measured data: the options of a fit, and those that a reconstruction has in addition.
+/// The field of the curve of a map, and what it says for all curves.
+pub(crate) const CURVE: &str = "curve";
+pub(crate) const WHOLE_MAP: &str = "all";
+
+/// The fields of measured data: which curve of a map, the options of a fit, and those that a
+/// reconstruction has in addition.
 fn data(case: &Case) -> Vec<Value> {
-    let mut fields: Vec<Value> = Vec::new();
+    let mut fields: Vec<Value> = vec![json!({
+        "name": CURVE,
+        "words": "curve of a map",
+        "value": "",
+        "hint": format!("the first; a number from 0, or `{WHOLE_MAP}` to fit each"),
+    })];
     for entry in ["fit", "reconstruct"].into_iter().filter_map(study) {
         let new = |field: &Value| fields.iter().all(|other| other["name"] != field["name"]);
         let more: Vec<Value> = of_options(entry).into_iter().filter(new).collect();

@@ -56,8 +56,8 @@ use crate::work::Workers;
 
 /// Largest request, in bytes; a case file and its options are far smaller.
 const LONGEST_REQUEST: usize = 256 << 10;
-/// Largest request with measured data.
-const LONGEST_DATA: usize = 2 << 20;
+/// Largest request with measured data: four thirds of the largest file that the page takes.
+const LONGEST_DATA: usize = 34 << 20;
 
 /// The initial case of the explorer, and its port.
 #[derive(Clone, Debug, Default)]

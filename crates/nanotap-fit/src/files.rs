@@ -226,6 +226,14 @@ pub fn open(path: &Path) -> Result<Document, Error> {
     opened(path, Origin::User)?.map_err(|error| refused(path, &error.to_string()))
 }
 
+/// As [`open`], of a file's content.
+///
+/// # Errors
+/// If it is none of an instrument that is known here.
+pub fn read(name: &str, bytes: Vec<u8>) -> Result<Document, Error> {
+    afm_files::read(bytes).map_err(|error| refused(Path::new(name), &error.to_string()))
+}
+
 /// The error of a file in which something is not found.
 fn refused(path: &Path, message: &str) -> Error {
     Error::input(

@@ -13,8 +13,9 @@ use nanotap::figure as figures;
 use nanotap::number::shortest;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin;
-use nanotap::study::fit::FitMap;
+use nanotap::study::fit::{FitMap, FitOptions};
 use nanotap::study::registry;
+use nanotap::study::request::read;
 use nanotap::study::scan::ScanLines;
 use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
@@ -38,8 +39,8 @@ pub(crate) struct Recipe {
 
 #[pymethods]
 impl Recipe {
-    /// The plan of the study `name` for a case. What chunks need, such as the attractors of a
-    /// basin, is computed now.
+    /// The plan of the study `name` for a case; the key `file` of a fit's request is the path of a map.
+    /// What chunks need, such as the attractors of a basin, is computed now.
     #[new]
     #[pyo3(signature = (name, case, request, *, threads=None, progress=None))]
     fn new(
@@ -51,11 +52,19 @@ impl Recipe {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let entry = entry(name)?;
-        let request = json(request)?;
+        let mut request = json(request)?;
+        let file = request.as_object_mut().and_then(|all| all.remove("file"));
+        let file = file.and_then(|file| file.as_str().map(PathBuf::from));
         let studied = case.studied(py)?;
         let done = watched(py, progress, move |control| {
-            Ok(install(threads, || {
-                entry.plan(&studied, request, control)
+            Ok(install(threads, || match &file {
+                Some(path) => {
+                    let options: FitOptions = read(request)?;
+                    let name = path.display().to_string();
+                    let options = options.of_map(&name, nanotap::files::open(path)?)?;
+                    FitMap::prepare(&studied, &options, control)
+                }
+                None => entry.plan(&studied, request, control),
             })??)
         })?;
         Ok(Self {

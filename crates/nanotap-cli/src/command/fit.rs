@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Args;
 use nanotap::case::Key;
@@ -13,7 +12,7 @@ use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{
     Estimate, FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve,
-    FittedParameter, MapFile, RivalParameter, Table as MeasuredTable,
+    FittedParameter, RivalParameter,
 };
 use serde::Serialize;
 
@@ -147,8 +146,7 @@ fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Resu
     if request.pixels.is_empty() {
         let document = files::open(&arguments.data)?;
         let name = arguments.data.display().to_string();
-        request.data = vec![MeasuredTable::of_document(&name, &document, 0)?];
-        request.map = MapFile(Some(Arc::new(document)));
+        *request = std::mem::take(request).of_map(&name, document)?;
     } else {
         request.data = measured(&arguments.data, &arguments.also, arguments.curve, "fit")?;
     }

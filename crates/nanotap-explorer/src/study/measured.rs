@@ -7,10 +7,15 @@ use nanotap::case::force_table::ForceTable;
 use nanotap::case::quantity::{Kind, format_electronvolts};
 use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key};
+use nanotap::control::Control;
 use nanotap::figure::fit::fit_figure;
 use nanotap::figure::reconstruct::reconstruct_figure;
+use nanotap::files;
+use nanotap::study::DatasetStudy as _;
 use nanotap::study::approach::ApproachStudy;
-use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table, measured};
+use nanotap::study::fit::{
+    FitMap, FitOptions, FitReport, FitStudy, FittedParameter, Table, measured,
+};
 use nanotap::study::reconstruct::{
     ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
 };
@@ -24,6 +29,7 @@ use super::{NextStep, Stage, Studied, object};
 use crate::api_error::ApiError;
 use crate::clicks::Height;
 use crate::commands::CASE_FILE;
+use crate::forms::{CURVE, WHOLE_MAP};
 use crate::motion_request::model_of;
 use crate::report;
 
@@ -32,10 +38,21 @@ impl Studied<'_> {
     pub(super) fn measured(&self) -> Result<(), ApiError> {
         let case = self.request.case.any_distance(self.app)?;
         model_of(&case)?;
-        let Some((name, text)) = &self.request.data else {
+        let Some((name, content)) = &self.request.data else {
             return Err(ApiError::input("no data", "drop a file on the page"));
         };
-        let table = Table::parse(name, text).map_err(ApiError::of)?;
+        let bytes = content.bytes()?;
+        let curve = self.field(CURVE).unwrap_or_default();
+        let is_map = curve == WHOLE_MAP;
+        let number = match curve {
+            "" | WHOLE_MAP => None,
+            number => Some(number.parse().map_err(|_| {
+                ApiError::input(
+                    format!("curve: expected a number, got `{number}`"),
+                    format!("give the number of a curve, from 0, or `{WHOLE_MAP}`"),
+                )
+            })?),
+        };
         let options = |study| study_named(study).map_or_else(Map::new, |entry| self.options(entry));
         let of_fit = options(FitStudy::NAME);
         let mut named = object(json!({ "data": [name] }));
@@ -46,14 +63,22 @@ impl Studied<'_> {
             let fitted = serde_json::to_value(FitOptions::default()).unwrap_or_default();
             of_curve.retain(|name, _| fitted.get(name).is_none() || given(name));
             let mut request: ReconstructOptions = read(Value::Object(of_curve.clone()))?;
-            request.data = vec![table];
+            request.data = vec![Table::of_bytes(name, bytes, number)?];
             named.extend(of_curve);
             return self.reconstructed(&case, &request, &named);
         }
         let mut request: FitOptions = read(Value::Object(of_fit.clone()))?;
-        request.data = vec![table];
         named.extend(of_fit);
-        if self.field("fit").is_err() {
+        let fits = self.field("fit").is_ok();
+        if fits && is_map {
+            let map = request.of_map(name, files::read(name, bytes)?)?;
+            return self.fitted_pixels(&case, &map, named);
+        }
+        request.data = vec![Table::of_bytes(name, bytes, number)?];
+        if let Some(number) = number {
+            named.insert(CURVE.into(), number.into());
+        }
+        if !fits {
             return self.over_model(&case, &request, &named);
         }
         if !request.pixels.is_empty() {
@@ -100,8 +125,8 @@ impl Studied<'_> {
     ) -> Result<(), ApiError> {
         let entry = study_named(FitStudy::NAME)
             .ok_or_else(|| ApiError::failed("this program has no fit"))?;
-        let options = serde_json::to_value(request).map_err(nanotap::Error::from)?;
-        let (summary, figure) = self.whole_dataset(entry, case, options)?;
+        let plan = |control: &Control<'_>| FitMap::prepare(case, request, control);
+        let (summary, figure) = self.whole_dataset(entry, plan)?;
         named.insert("out".into(), "fit.zarr".into());
         self.hand(Stage {
             figure,
@@ -188,7 +213,10 @@ impl Studied<'_> {
             (low, high) = (low.min(at), high.max(at));
         }
         let length = |value: f64| Kind::Length.format_exact(value);
-        let distance = swept == Some(Key::GapTip) && case.is_physical() && low < high;
+        let distance = swept == Some(Key::GapTip)
+            && case.is_physical()
+            && low < high
+            && !data.is_force_curve();
         let (mut figure, factor) = if distance {
             let options =
                 object(json!({ "points": APPROACH[0], "from": length(high), "to": length(low) }));

@@ -15,11 +15,13 @@ use std::time::{Duration, Instant};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::model::Model;
-use nanotap::study::registry::{Study, StudyEntry, study as study_named};
+use nanotap::study::registry::{DatasetPlan, Study, StudyEntry, study as study_named};
 use nanotap::study::request::{Property, properties, read};
 use nanotap::study::sweep::Over;
 use nanotap_figures::Figure;
@@ -47,13 +49,32 @@ pub(crate) struct StudyRequest {
     start: String,
     /// Name of a tab of the page, or of a study of the registry.
     tab: String,
-    /// Measured data: name and text of the file.
+    /// Measured data: name and content of the file.
     #[serde(default)]
-    data: Option<(String, String)>,
+    data: Option<(String, Content)>,
     options: Map<String, Value>,
     /// Number of a figure whose curves are drawn behind this one; 0: none.
     #[serde(default)]
     pinned: u64,
+}
+
+/// The content of a measured file: a text, or the bytes of any file in base64.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+enum Content {
+    Text(String),
+    Bytes { base64: String },
+}
+
+impl Content {
+    fn bytes(&self) -> Result<Vec<u8>, ApiError> {
+        match self {
+            Self::Text(text) => Ok(text.as_bytes().to_vec()),
+            Self::Bytes { base64 } => STANDARD.decode(base64).map_err(|error| {
+                ApiError::input(format!("the file is not base64: {error}"), "send it again")
+            }),
+        }
+    }
 }
 
 pub(crate) async fn study(
@@ -224,13 +245,10 @@ impl Studied<'_> {
     /// A dataset of a study, in a folder that is removed once the figure is drawn.
     fn dataset<T>(
         &self,
-        case: &Case,
-        entry: &StudyEntry,
-        request: Value,
+        plan: &DatasetPlan,
         control: &Control<'_>,
         use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
     ) -> Result<T, ApiError> {
-        let plan = entry.plan(case, request, control)?;
         let scratch = Scratch::within(&self.app.scratch)?;
         let store =
             Store::create_or_resume(&scratch.path().join("data.zarr"), plan.schema().clone())
@@ -255,7 +273,8 @@ impl Studied<'_> {
         let entry =
             study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
         let request = Value::Object(request.clone());
-        self.dataset(case, entry, request, self.control, use_it)
+        let plan = entry.plan(case, request, self.control)?;
+        self.dataset(&plan, self.control, use_it)
     }
 
     /// Computes the stages one by one until the work is cancelled; `stage` gets its count and the

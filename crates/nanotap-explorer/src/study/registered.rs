@@ -1,8 +1,8 @@
 //! Studies of the registry that the page shows by their report alone.
 
 use nanotap::Error;
-use nanotap::case::Case;
-use nanotap::study::registry::{StudyEntry, study as study_named};
+use nanotap::control::Control;
+use nanotap::study::registry::{DatasetPlan, StudyEntry, study as study_named};
 use nanotap_figures::Figure;
 use serde_json::Value;
 
@@ -42,7 +42,8 @@ impl Studied<'_> {
             }
             (answer.figure(), tables)
         } else {
-            let (summary, figure) = self.whole_dataset(entry, &case, request)?;
+            let plan = |control: &Control<'_>| entry.plan(&case, request, control);
+            let (summary, figure) = self.whole_dataset(entry, plan)?;
             (figure, report::tables(&summary, schema.as_value()))
         };
         self.hand(Stage {
@@ -58,11 +59,10 @@ impl Studied<'_> {
     pub(super) fn whole_dataset(
         &self,
         entry: &StudyEntry,
-        case: &Case,
-        request: Value,
+        plan: impl FnOnce(&Control<'_>) -> Result<DatasetPlan, Error>,
     ) -> Result<(Value, Option<Figure>), ApiError> {
         self.counting(entry.counted, |control| {
-            self.dataset(case, entry, request, control, |store| {
+            self.dataset(&plan(control)?, control, |store| {
                 let summary = entry.summary.map(|of| of(store)).transpose()?;
                 Ok(summary.map_or_else(Default::default, |(summary, figure)| {
                     (summary, Some(figure))

@@ -25,8 +25,9 @@ const MIN_ROWS: usize = 12;
 const FIRST: f64 = 0.1;
 /// A row this many standard deviations of one off the farthest ones is no baseline.
 const OFF: f64 = 4.0;
-/// Factors of the stiffness of the contact, as powers of ten: up to this, in steps of this.
-const DECADES: (f64, f64) = (5.0, 0.25);
+/// Factors of the stiffness of the contact: up to so many decades either way, each looked at, and the best
+/// one to this part of a decade.
+const DECADES: (i32, f64) = (5, 0.25);
 /// A scan counts if it lowers the cost by this factor: of many rows few may be in contact.
 const BETTER: f64 = 0.999;
 /// Rounds in which the pull-off force and its parameter meet, to a part of it; least power with which
@@ -126,31 +127,40 @@ impl Search<'_> {
         let stiffnesses: Vec<usize> = (0..own.len())
             .filter(|k| parameters[*k].is_unknown_of(&keys))
             .collect();
-        let count = (DECADES.0 / DECADES.1) as i32;
-        let powers = if stiffnesses.is_empty() {
-            0..=0
-        } else {
-            -count..=count
-        };
-        let mut best: Option<(f64, Vec<f64>)> = None;
-        for power in powers {
+        let mut best: Option<(f64, f64, Vec<f64>)> = None;
+        let mut look = |power: f64| {
             if self.control.is_cancelled() {
-                break;
+                return 0.0;
             }
             let mut x = own.to_vec();
             for k in &stiffnesses {
-                let factor = nanotap_arithmetic::powf(10.0, f64::from(power) * DECADES.1);
+                let factor = nanotap_arithmetic::powf(10.0, power);
                 let (low, high) = parameters[*k].bounds;
                 x[*k] = (x[*k] * factor).clamp(low, high);
             }
             let x = self.aligned(&x);
             let cost = self.cost_of_rests(&x);
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, x));
+            if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+                best = Some((cost, power, x));
+            }
+            best.as_ref().map_or(0.0, |(_, power, _)| *power)
+        };
+        let mut centre = look(0.0);
+        if !stiffnesses.is_empty() {
+            for power in 1..=DECADES.0 {
+                look(f64::from(power));
+                centre = look(-f64::from(power));
+            }
+            let mut step = 0.5;
+            while step >= DECADES.1 {
+                let middle = centre;
+                look(middle + step);
+                centre = look(middle - step);
+                step /= 2.0;
             }
         }
-        best.filter(|(cost, _)| *cost < BETTER * own_cost)
-            .map(|(_, x)| x)
+        best.filter(|(cost, ..)| *cost < BETTER * own_cost)
+            .map(|(.., x)| x)
     }
 
     fn cost_of_rests(&self, x: &[f64]) -> f64 {
@@ -167,13 +177,18 @@ impl Search<'_> {
         let problem = &self.problem;
         let mut x = x.to_vec();
         for _ in 0..MEETINGS {
+            let mut adheres = false;
             for curve in 0..problem.data.curves.len() {
                 if let Some((k, value)) = self.adhesion(&x, curve) {
+                    adheres = true;
                     x = with(&x, k, value);
                 }
                 if let Some((k, offset)) = self.offset_of_rests(&x, curve) {
                     x = with(&x, k, offset);
                 }
+            }
+            if !adheres {
+                break;
             }
         }
         x

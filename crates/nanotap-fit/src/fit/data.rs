@@ -499,7 +499,7 @@ pub fn is_distance(key: Key) -> bool {
 const DIRECTIONS: &str = "write approach or retract; for other sweeps, up or down";
 
 /// Parses a direction: an upward sweep comes first, as an approach does.
-fn way(word: &str) -> Option<Way> {
+pub(super) fn way(word: &str) -> Option<Way> {
     match word.to_lowercase().as_str() {
         "approach" | "extend" | "trace" | "up" => Some(Way::Approach),
         "retract" | "retrace" | "down" => Some(Way::Retract),

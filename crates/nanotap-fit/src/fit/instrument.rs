@@ -11,6 +11,7 @@ use nanotap_case::physical::free_response::free_response;
 use nanotap_case::table::{DECIMAL_COMMAS, Entry, Header, Table};
 use nanotap_case::{Case, Key};
 use nanotap_error::Error;
+use nanotap_motions::approach::Way;
 use nanotap_quantity::number::shortest;
 
 use super::data;
@@ -765,7 +766,8 @@ fn guess_force_curve(
     if distance.len() < MIN_ROWS || !is_curve(case, table, &places) {
         return false;
     }
-    let is_reversed = !stated.direction && bends_far(&distance, &values);
+    let rises = approach_rises(table, &distance);
+    let is_reversed = !stated.direction && rises.unwrap_or_else(|| bends_far(&distance, &values));
     if is_reversed {
         for z in &mut distance {
             *z = -*z;
@@ -780,21 +782,52 @@ fn guess_force_curve(
     is_reversed
 }
 
-/// Whether a force curve changes more where the distance is large than where it is small.
+/// Whether the distance rises while the tip approaches, of a table whose rows are in the order in which
+/// they were measured: an approach and then a retract, on which the distance goes the other way.
+fn approach_rises(table: &Table, distance: &[f64]) -> Option<bool> {
+    let place = place_of(table, &["direction", "way"])?;
+    let way = |entry: &Entry| match entry {
+        Entry::Text(word) => data::way(word),
+        _ => None,
+    };
+    let ways = table.columns[place].1.iter().map(way);
+    let ways: Vec<Way> = ways.collect::<Option<_>>()?;
+    let runs: Vec<(Way, usize)> = ways
+        .chunk_by(|a, b| a == b)
+        .map(|run| (run[0], run.len()))
+        .collect();
+    let [(Way::Approach, turn), (Way::Retract, rest)] = runs[..] else {
+        return None;
+    };
+    let travel = |from: usize, to: usize| distance[to - 1] - distance[from];
+    let [there, back] = [travel(0, turn), travel(turn, turn + rest)];
+    (there * back < 0.0).then_some(there > 0.0)
+}
+
+/// Whether a force curve leaves the line through its middle farther where the distance is large than where
+/// it is small. A tilt of the baseline leaves both ends on that line.
 fn bends_far(distance: &[f64], values: &[f64]) -> bool {
     let sorted = by_distance(distance);
+    let quarter = sorted.len() / 4;
+    let middle = &sorted[quarter..sorted.len() - quarter];
+    let [mut z, mut y, mut zz, mut zy] = [0.0; 4];
+    for k in middle {
+        z += distance[*k] / middle.len() as f64;
+        y += values[*k] / middle.len() as f64;
+    }
+    for k in middle {
+        zz += (distance[*k] - z) * (distance[*k] - z);
+        zy += (distance[*k] - z) * (values[*k] - y);
+    }
+    let slope = if zz > 0.0 { zy / zz } else { 0.0 };
     let part = (distance.len() / 12).clamp(3, distance.len() / 4);
-    let level = |from: usize| {
-        median(
-            sorted[from..from + part]
-                .iter()
-                .map(|k| values[*k])
-                .collect(),
-        )
+    let off = |rows: &[usize]| {
+        let off = rows
+            .iter()
+            .map(|k| values[*k] - y - slope * (distance[*k] - z));
+        median(off.collect()).abs()
     };
-    let last = sorted.len() - part;
-    let near = (level(0) - level(part)).abs();
-    (level(last) - level(last - part)).abs() > near
+    off(&sorted[sorted.len() - part..]) > off(&sorted[..part])
 }
 
 /// Approach and retract as a column, if there is none and the distance turns.

@@ -1,9 +1,9 @@
 //! Fits of a map of curves: a force volume, one fit a pixel, into a dataset.
 //!
 //! The rows of the data name their pixel in further columns, or the map is an instrument's file, whose
-//! curves are read when they are fitted. Pixels of a chunk are fitted in
-//! sequence, each from the result of the one before; where that does not describe the data, from every
-//! initial value again, as a single curve. The result does not depend on threads.
+//! curves are read when they are fitted. Pixels of a chunk are fitted in sequence, each from the result of
+//! the one before first; where that does not describe the data, from the initial values of a single curve,
+//! too. The result does not depend on threads.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -185,6 +185,20 @@ pub(crate) const OF_FORCES: [(&str, &str, &str); 3] = [
 /// A map in an instrument's file, whose curves are read one by one.
 #[derive(Clone, Debug, Default)]
 pub struct MapFile(pub Option<Arc<Document>>);
+
+impl FitOptions {
+    /// The same options for the map of an instrument's file, which is open under this name.
+    ///
+    /// # Errors
+    /// If its first curve cannot be read.
+    pub fn of_map(self, name: &str, document: Document) -> Result<Self, Error> {
+        Ok(Self {
+            data: vec![Table::of_document(name, &document, 0)?],
+            map: MapFile(Some(Arc::new(document))),
+            ..self
+        })
+    }
+}
 
 impl PartialEq for MapFile {
     fn eq(&self, other: &Self) -> bool {
@@ -446,18 +460,8 @@ impl Map {
             ..self.options.clone()
         };
         if let Some(before) = before {
-            options.starts = 1;
-            let known = |key: &str| {
-                let own = options.start.iter().filter_map(|text| text.split_once('='));
-                own.into_iter().any(|(name, _)| name.trim() == key)
-            };
-            let further = before.parameters.iter().filter(|p| !known(&p.key));
-            let further = further.map(|p| match p.unit.as_str() {
-                "1" => format!("{}={}", p.key, p.value),
-                unit => format!("{}={} {unit}", p.key, p.value),
-            });
-            let further: Vec<String> = further.collect();
-            options.start.extend(further);
+            let near = before.parameters.iter().map(|p| (p.key.clone(), p.value));
+            options.near = near.collect();
         }
         let mut found = fit(&self.case, &options, control)?;
         found.turned ^= turned;
@@ -516,56 +520,57 @@ impl Map {
         }
     }
 
+    /// The values of a pixel in the order of the variables, of the fit of its curve if there is a result.
+    fn values(&self, report: Option<&FitReport>) -> Vec<f64> {
+        let mut values = Vec::new();
+        let mut push = |of: Option<f64>| values.push(of.unwrap_or(f64::NAN));
+        for key in &self.parameters {
+            let mut all = report.iter().flat_map(|report| &report.parameters);
+            let found = all.find(|p| p.key == *key);
+            push(found.map(|p| p.value));
+            push(found.and_then(|p| p.standard_error));
+        }
+        if self.has_forces {
+            let curve = report.and_then(|report| report.force_curves.first());
+            push(curve.and_then(|curve| Some(curve.contact_point.as_ref()?.value)));
+            push(curve.and_then(|curve| curve.adhesion_force.map(|force| -force)));
+            push(curve.map(|curve| curve.residual_force));
+        }
+        push(report.map(|of| of.chi2 / of.degrees_of_freedom.max(1) as f64));
+        let result = report.map_or(3.0, |of| if of.fits && !of.misfit { 1.0 } else { 2.0 });
+        push(Some(result));
+        values
+    }
+
     /// The values of the pixels of a chunk, by variable; none if the work was cancelled.
     fn chunk(&self, block: &Block, control: &Control<'_>) -> Option<Vec<Values>> {
         let quiet = Control {
             progress: None,
             ..*control
         };
-        let forces = if self.has_forces { OF_FORCES.len() } else { 0 };
-        let count = 2 * self.parameters.len() + forces + 2;
+        let count = self.schema.variables.len();
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); count];
         let mut before: Option<FitReport> = None;
         let axes = &self.schema.grid.axes;
         for entry in block.entries() {
             let entry = entry.iter().zip(axes);
             let entry = entry.fold(0, |flat, (at, axis)| flat * axis.length + at);
-            let mut values = vec![f64::NAN; count];
-            values[count - 1] = 0.0;
-            if self.source.has(entry) {
-                let near = before
-                    .as_ref()
-                    .map(|near| self.fitted(entry, Some(near), &quiet));
-                let report = match near {
-                    Some(Ok(report)) if report.fits && !report.misfit => Ok(report),
-                    _ => self.fitted(entry, None, &quiet),
-                };
+            let values = if self.source.has(entry) {
+                let report = self.fitted(entry, before.as_ref(), &quiet);
                 if quiet.is_cancelled() {
                     return None;
                 }
-                values[count - 1] = 3.0;
-                if let Ok(report) = report {
-                    let of = |key: &String| report.parameters.iter().find(|p| p.key == *key);
-                    for (k, parameter) in self.parameters.iter().map(of).enumerate() {
-                        values[2 * k] = parameter.map_or(f64::NAN, |p| p.value);
-                        let error = parameter.and_then(|p| p.standard_error);
-                        values[2 * k + 1] = error.unwrap_or(f64::NAN);
-                    }
-                    if let (true, Some(curve)) = (self.has_forces, report.force_curves.first()) {
-                        let contact = curve.contact_point.map_or(f64::NAN, |point| point.value);
-                        let adhesion = curve.adhesion_force.map_or(f64::NAN, |force| -force);
-                        values[count - 5] = contact;
-                        values[count - 4] = adhesion;
-                        values[count - 3] = curve.residual_force;
-                    }
-                    values[count - 2] = report.chi2 / report.degrees_of_freedom.max(1) as f64;
-                    let fits = report.fits && !report.misfit;
-                    values[count - 1] = if fits { 1.0 } else { 2.0 };
-                    if fits {
-                        before = Some(report);
-                    }
-                }
-            }
+                let values = self.values(report.as_ref().ok());
+                // An elastic law that describes no curve to its noise still begins near the next one.
+                let describes = |report: &FitReport| report.fits && !report.misfit;
+                let begins = |report: &FitReport| describes(report) || self.has_forces;
+                before = report.ok().filter(begins).or(before);
+                values
+            } else {
+                let mut values = vec![f64::NAN; count];
+                values[count - 1] = 0.0;
+                values
+            };
             for (column, value) in columns.iter_mut().zip(values) {
                 column.push(value);
             }

@@ -134,6 +134,9 @@ options! {
         /// A map in an instrument's file, of which `data` has a curve
         #[serde(skip)]
         pub map: MapFile = MapFile::default(),
+        /// Values of parameters, in SI, from which the search begins: those of a curve near by
+        #[serde(skip)]
+        pub near: Vec<(String, f64)> = Vec::new(),
         /// Segment of a curve to fit; default for a force curve: its approach under an elastic law, both
         /// under one with adhesion or losses
         pub segment: Option<Segment> = None,

@@ -359,7 +359,7 @@ impl Search<'_> {
             .any(|(fitted, column)| fitted.residual > MIN_RESIDUAL * column.spread);
         if most >= MIN_SEQUENCE
             && resolved
-            && of_rows.chance(found.solution.residuals.as_slice()) < LEVEL_OF_SIGNS
+            && of_rows.is_chance_below(LEVEL_OF_SIGNS, found.solution.residuals.as_slice())
         {
             reasons.push("the residuals keep their sign from row to row".to_owned());
         }

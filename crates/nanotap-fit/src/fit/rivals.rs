@@ -4,17 +4,21 @@
 //! distance is aligned anew, and the fit is repeated from there: rough, and in full if the rough fit
 //! is about as good as the accepted one and ends elsewhere. A minimum whose criterion of Akaike is
 //! within [`REACH`] of the best one is a rival. What decides between two of them is the observable of
-//! their orbits, not measured so far, that differs most for the noise of the data.
+//! their orbits, not measured so far, that differs most for the noise of the data; of force curves the
+//! retract if it was not measured, or rows deeper in the sample.
 //!
 //! Fails by omission: minima that none of these starts leads to.
 
 use nalgebra::DVector;
 use nanotap_case::Key;
+use nanotap_case::physical::Kind;
+use nanotap_motions::approach::Way;
 use nanotap_observe::{OBSERVABLES, Observable, ObservableSet, measure};
 
 use super::effort::Part;
 use super::parameters::Target;
-use super::problem::RowPoint;
+use super::problem::{Rested, RowPoint};
+use super::quantity::RestQuantity;
 use super::report::{Rival, RivalParameter};
 use super::search::{Found, Search};
 
@@ -36,6 +40,10 @@ const SAME: f64 = 1.0;
 const MAX_LOST: f64 = 0.1;
 /// Difference of an observable over all rows, in standard errors, that decides.
 const DECISIVE: f64 = 6.0;
+/// How much deeper rows are looked at that might decide, as a part of the range of distances.
+const DEEPER: f64 = 0.25;
+const NOTHING_DECIDES: &str =
+    "No other column of these rows decides: rows nearer to the sample may";
 /// Observables that might decide, as a lock-in amplifier or a recorder measures them.
 const DECIDERS: [&str; 4] = [
     "phase",
@@ -172,7 +180,11 @@ impl Search<'_> {
             standard_error: information.errors[k],
             unit: parameter.unit(data, self.problem.case),
         });
-        let (decides, words) = self.decider(found, rival);
+        let (decides, words) = if data.is_force_curve() {
+            self.decider_of_rests(found, rival)
+        } else {
+            self.decider(found, rival)
+        };
         Rival {
             parameters: parameters.collect(),
             above_best: self.above(rival, found),
@@ -180,6 +192,52 @@ impl Search<'_> {
             decides,
             words,
         }
+    }
+
+    /// What decides between two fits of force curves, and a sentence about it: the retract where it was not
+    /// measured, or rows deeper in the sample.
+    fn decider_of_rests(&self, found: &Found, rival: &Found) -> (Option<String>, String) {
+        let data = self.problem.data;
+        let column = &data.columns[0];
+        let name = column.quantity.name();
+        let kind = match column.quantity.rest() {
+            Some(RestQuantity::Force) => Kind::Force,
+            _ => Kind::Length,
+        };
+        // The largest difference of a reading over all curves, if it is decisive.
+        let differs = |of: &dyn Fn(Rested, RestQuantity) -> Option<f64>| {
+            let quantity = column.quantity.rest()?;
+            let reading = |x: &[f64], curve: usize| of(self.problem.rested(x, curve)?, quantity);
+            let pairs = (0..data.curves.len()).filter_map(|curve| {
+                let best = reading(&found.solution.x, curve)?;
+                Some([best, reading(&rival.solution.x, curve)?])
+            });
+            let size = |pair: &[f64; 2]| (pair[1] - pair[0]).abs();
+            let most = pairs.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+            (size(&most) > DECISIVE * found.noise[0]).then_some(most)
+        };
+        let written = |values: [f64; 2]| values.map(|value| kind.format_digits(value, 3));
+        let has_retract = data.rows().any(|row| row.way == Some(Way::Retract));
+        let pull_off = differs(&|rested, quantity| rested.pull_off(quantity));
+        if let Some(pair) = pull_off.filter(|_| !has_retract) {
+            let [best, other] = written(pair);
+            return (
+                Some("retract".to_owned()),
+                format!("The retract decides: at pull-off the {name} is {best} or {other}"),
+            );
+        }
+        if let Some(pair) = differs(&|rested, quantity| rested.beyond(quantity, DEEPER)) {
+            let [best, other] = written(pair);
+            let percent = 100.0 * DEEPER;
+            return (
+                Some(name.to_owned()),
+                format!(
+                    "Rows deeper in the sample decide: {percent:.0} % of the range of distances beyond the \
+                     last row the {name} is {best} or {other}"
+                ),
+            );
+        }
+        (None, NOTHING_DECIDES.to_owned())
     }
 
     /// The observable that decides between two fits, and a sentence about it.
@@ -204,12 +262,8 @@ impl Search<'_> {
             .filter_map(|name| OBSERVABLES.iter().find(|o| o.name == *name))
             .collect();
         let nothing = || {
-            (
-                None,
-                "No other column of these rows decides: rows nearer to the sample or another free \
-                 amplitude may"
-                    .to_owned(),
-            )
+            let words = format!("{NOTHING_DECIDES}; so may another free amplitude");
+            (None, words)
         };
         if noise.is_nan() || noise <= 0.0 {
             return nothing();

@@ -8,6 +8,7 @@ use super::branches::Rows;
 use super::data::Data;
 use super::effort::Part;
 use super::jumps::Jump;
+use super::parameters::Parameter;
 use super::problem::{MAX_RINGING, Point, Problem};
 use super::report::FitReport;
 use super::solve::{Solution, minimise};
@@ -66,18 +67,16 @@ const MAX_ROUNDS: usize = 6;
 
 impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
-        let (starts, first) = self.starts();
         let mut best: Option<Found> = None;
         let mut others: Vec<Found> = Vec::new();
         let mut least_rough = 0.0;
         let mut tried = 0;
-        for start in &starts {
+        for start in self.starts() {
             if self.control.is_cancelled() || tried > 0 && self.problem.effort.ends(Part::Starts) {
                 break;
             }
-            let scanned = (tried >= first).then(|| self.with_best_offset(start));
             tried += 1;
-            let (x, rough) = self.rough(scanned.flatten().unwrap_or_else(|| start.clone()));
+            let (x, rough) = self.rough(start);
             // A minimum that is not lower is not computed in full, where a rough fit tells.
             let tolerance = ROUGH_TOLERANCE * least_rough;
             if least_rough > MIN_ROUGH && rough > least_rough - tolerance {
@@ -88,7 +87,7 @@ impl<'a> Search<'a> {
             }
             let found = self.fine(x);
             if let Some(report) = self.control.progress {
-                report(tried, starts.len());
+                report(tried, self.request.starts.max(1));
             }
             let Some(found) = found else { continue };
             least_rough = if best.is_some() {
@@ -132,12 +131,13 @@ impl<'a> Search<'a> {
         Ok(self.report(best, &rivals, tried))
     }
 
-    /// Initial values: those of a scan, if it finds better ones than the case's, and those of the
-    /// case, and the number of these; then others within the bounds or a factor of four.
-    fn starts(&self) -> (Vec<Vec<f64>>, usize) {
+    /// Initial values, each computed when it is needed: those of a curve near by, if there is one; those of
+    /// a scan, if it finds better ones than the case's, and those of the case; then others within the bounds
+    /// or a factor of four, with the best offset of the distance.
+    fn starts(&self) -> impl Iterator<Item = Vec<f64>> {
         let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
         // SplitMix64 (Steele, Lea, Flood 2014).
-        let mut random = || {
+        let mut random = move || {
             state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
             let mut z = state;
             z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -145,12 +145,18 @@ impl<'a> Search<'a> {
             ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
         };
         let parameters = self.problem.parameters;
+        let near = &self.request.near;
+        let value_near = |p: &Parameter| near.iter().find(|(name, _)| *name == p.name);
+        let near = parameters
+            .iter()
+            .map(|p| value_near(p).map(|(_, value)| value.clamp(p.bounds.0, p.bounds.1)));
+        let near: Option<Vec<f64>> = near.collect();
         let own: Vec<f64> = parameters.iter().map(|p| p.start).collect();
-        let mut starts: Vec<Vec<f64>> = self.scanned(&own).into_iter().collect();
-        starts.push(own);
-        starts.truncate(self.request.starts.max(1));
-        let first = starts.len();
-        while starts.len() < self.request.starts {
+        let scan = std::iter::once_with({
+            let own = own.clone();
+            move || self.scanned(&own)
+        });
+        let further = std::iter::repeat_with(move || {
             let start = parameters.iter().map(|p| {
                 let u = random();
                 let (mut low, mut high) = if p.start > 0.0 && p.bounds.0 >= 0.0 {
@@ -168,9 +174,11 @@ impl<'a> Search<'a> {
                     low + u * (high - low)
                 }
             });
-            starts.push(start.collect());
-        }
-        (starts, first)
+            let start: Vec<f64> = start.collect();
+            self.with_best_offset(&start).unwrap_or(start)
+        });
+        let first = near.into_iter().chain(scan.flatten()).chain([own]);
+        first.chain(further).take(self.request.starts.max(1))
     }
 
     /// The problem with other weights.

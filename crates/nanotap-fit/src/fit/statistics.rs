@@ -268,7 +268,9 @@ pub(super) struct Sequences<'a> {
     pub(super) basis: &'a DMatrix<f64>,
 }
 
-/// Draws of the null distribution of [`Sequences::chance`].
+/// Standard deviations of the persistence that no noise reaches.
+const SURE: f64 = 6.0;
+/// Draws of the null distribution of [`Sequences::is_chance_below`].
 const DRAWS: usize = 2000;
 /// Most deviates that are drawn for it.
 const MAX_DEVIATES: usize = 4_000_000;
@@ -289,20 +291,29 @@ impl Sequences<'_> {
         self.columns.iter().map(of).sum()
     }
 
-    /// The probability that independent noise keeps its sign from row to row as much as these
-    /// residuals do. The null distribution is simulated: the fit takes the part of the noise that
-    /// the parameters can describe.
-    pub(super) fn chance(&self, residuals: &[f64]) -> f64 {
+    /// Whether the probability that independent noise keeps its sign from row to row as much as these
+    /// residuals do is below a level. The null distribution is simulated: the fit takes the part of the
+    /// noise that the parameters can describe.
+    pub(super) fn is_chance_below(&self, level: f64, residuals: &[f64]) -> bool {
         let found = self.persistence(residuals);
+        // Of many rows the sum is about normal.
+        if found > SURE * (self.columns.len() as f64).sqrt() {
+            return true;
+        }
         let count = residuals.len();
         let draws = DRAWS.min(MAX_DEVIATES / count.max(1)).max(200);
+        let most = level * (draws + 1) as f64;
         let mut deviates = Deviates(0x5eed);
-        let exceeding = (0..draws).filter(|_| {
+        let mut exceeding = 1;
+        for _ in 0..draws {
             let noise = nalgebra::DVector::from_fn(count, |_, _| deviates.normal());
             let left = &noise - self.basis * self.basis.tr_mul(&noise);
-            self.persistence(left.as_slice()) >= found
-        });
-        (exceeding.count() + 1) as f64 / (draws + 1) as f64
+            exceeding += usize::from(self.persistence(left.as_slice()) >= found);
+            if exceeding as f64 >= most {
+                return false;
+            }
+        }
+        true
     }
 }
 
@@ -370,12 +381,12 @@ mod tests {
         for _ in 0..100 {
             let noise = nalgebra::DVector::from_fn(60, |_, _| deviates.normal());
             let left = &noise - &basis * basis.tr_mul(&noise);
-            few += usize::from(sequences.chance(left.as_slice()) < 0.1);
+            few += usize::from(sequences.is_chance_below(0.1, left.as_slice()));
         }
         // 10 expected, three standard deviations are 9.
         assert!((1..=19).contains(&few), "{few}");
         let bent: Vec<f64> = (0..60).map(|i| ((i / 2) as f64 / 5.0).sin()).collect();
-        assert!(sequences.chance(&bent) < 0.001);
+        assert!(sequences.is_chance_below(0.001, &bent));
     }
 
     #[test]

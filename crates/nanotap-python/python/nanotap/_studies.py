@@ -493,10 +493,10 @@ def fit(
 
 @stoppable()
 def fit_map(
-    case: Case,
-    data: Any,
-    pixels: str | Iterable[str],
-    free: str | Iterable[str],
+    case: Any,
+    data: Any = None,
+    pixels: str | Iterable[str] | None = None,
+    free: str | Iterable[str] | None = None,
     *,
     out: Path | None = None,
     chunk: str = "1/1",
@@ -508,10 +508,12 @@ def fit_map(
     """Fits a force volume: one curve a pixel, each from the result of its neighbour.
 
     Args:
-        case: Lever and sample.
-        data: A table of all curves, as `fit` takes it, whose rows name their pixel.
-        pixels: One or two columns that name the pixel, such as `["x", "y"]`; the last changes
-            slowest.
+        case: Lever and sample; or the map itself, if its header has the stiffness of the lever and
+            `tip_radius` or `half_angle` is given.
+        data: The path of a map as an instrument wrote it, such as a .jpk-qi-data; or a table of all curves,
+            as `fit` takes it, whose rows name their pixel.
+        pixels: Of a table, one or two columns that name the pixel, such as `["x", "y"]`; the last
+            changes slowest.
         free: Parameters to find, as in `fit`.
         out: The dataset, a folder with the extension .zarr; an existing one is resumed. Without it,
             everything is in memory.
@@ -520,37 +522,46 @@ def fit_map(
         client: A Dask client on whose workers the chunks are computed, with the same bytes.
         progress: Whether to show a bar, or a function that is called with the finished and the
             total count of rows of pixels.
-        **options: Further options of `fit`, such as `convert` or `bounds`.
+        **options: Further options of `fit`, such as `convert`, `bounds` or `segment`.
 
     Returns:
         Over the pixels each parameter (`ds["sample.modulus"]`) with its standard error
-        (`"sample.modulus_error"`), `chi2_reduced`, and `result`: fits, misfit (the residuals are not
-        noise), failed, or empty without data.
+        (`"sample.modulus_error"`), of force curves `contact_point`, `adhesion_force` and
+        `residual_force`, `chi2_reduced`, and `result`: fits, misfit (the residuals are not noise), failed,
+        or empty without data.
 
     Raises:
-        ValueError: an option or the table is not valid.
+        ValueError: an option, the table or the file is not valid.
         Interrupted: Ctrl-C; its `result` is the dataset up to the last finished pixels, or with `out`
             the whole dataset with the rest missing.
 
     Example:
         >>> import nanotap
+        >>> ds = nanotap.fit_map("cells.jpk-qi-data", tip_radius="5 um")  # doctest: +SKIP
+        >>> ds["sample.modulus"].median()  # doctest: +SKIP
         >>> case = nanotap.Case.from_file("lever.toml")  # doctest: +SKIP
         >>> ds = nanotap.fit_map(case, "volume.csv", ["x", "y"], "sample.modulus")  # doctest: +SKIP
-        >>> ds["sample.modulus"].median()  # doctest: +SKIP
     """
+    if data is None:
+        case, data = None, case
+    named = {**options, "pixels": pixels, "free": free}
     lists = {
-        name: _arguments.names(name, options[name])
-        for name in ("columns", "convert", "start")
-        if options.get(name) is not None
+        name: _arguments.names(name, named[name])
+        for name in ("columns", "convert", "start", "pixels", "free")
+        if named.get(name) is not None
     }
-    asked = {
-        **options,
-        **lists,
-        "data": _arguments.tables(data),
-        "pixels": _arguments.names("pixels", pixels),
-        "free": _arguments.names("free", free),
-    }
-    plan = ("fit", _cased(case), _arguments.request("fit", asked))
+    asked = {**options, **lists, "data": _arguments.tables(data)}
+    if case is None:
+        words, _ = _nanotap.implied_case(_arguments.request("fit", asked))
+        case = Case(**dict(word.split("=", 1) for word in words))
+    request = _arguments.request("fit", asked)
+    if pixels is None:
+        if not isinstance(data, str | os.PathLike):
+            message = "pixels: name the columns of the table that tell the pixel"
+            raise TypeError(message)
+        whole = _arguments.request("fit", {**asked, "data": []})
+        request = json.dumps({**json.loads(whole), "file": os.fspath(existing(data))})
+    plan = ("fit", _cased(case), request)
     ds = _datasets.computed(plan, "rows", out, chunk, threads, client, progress)
     return ds.assign(result=_datasets.in_words(ds.result))
 

@@ -89,7 +89,7 @@ impl RestLever {
         let mut found = chain
             .0
             .iter()
-            .filter_map(|p| self.statics.between(p, of, value));
+            .filter_map(|p| self.statics.between(&p.rests, of, value));
         found.next().map(|rest| rest.distance * self.length)
     }
 

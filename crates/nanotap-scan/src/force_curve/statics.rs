@@ -13,7 +13,7 @@ use nanotap_error::Error;
 use nanotap_model::Model;
 use nanotap_model::nonlinear::Nonlinear;
 use nanotap_volterra::Guard;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use super::path::Plan;
 
@@ -97,6 +97,11 @@ const BEAM_COMPLIANCE: f64 = 1.0 / 3.0;
 const POINTS: usize = 1200;
 /// Smallest step from there, as a part of the range.
 const NEAR: f64 = 1e-9;
+/// These parts of the ranges of separations.
+static PARTS: LazyLock<Vec<f64>> = LazyLock::new(|| {
+    let part = |k| nanotap_arithmetic::powf(NEAR, k as f64 / POINTS as f64);
+    (0..=POINTS).map(part).collect()
+});
 /// Two ends meet within this part of the range.
 const MEET: f64 = 1e-9;
 
@@ -266,7 +271,8 @@ impl StaticCurve {
         for _ in 0..40 {
             let pieces = self.pieces(near, far);
             let stable = pieces.iter().filter(|piece| piece.stable);
-            let mut found = stable.filter_map(|piece| self.between(piece, |r| r.force, force));
+            let mut found =
+                stable.filter_map(|piece| self.between(&piece.rests, |r| r.force, force));
             if let Some(rest) = found.next() {
                 return Some(rest.distance);
             }
@@ -277,7 +283,15 @@ impl StaticCurve {
 
     /// The rest of a piece at a distance.
     pub(super) fn at(&self, piece: &Piece, distance: f64) -> Option<Rest> {
-        self.between(piece, |rest| rest.distance, distance)
+        // Along a stable piece the distance falls: only two rests can be about it.
+        let rests = if piece.stable {
+            let first = piece.rests.partition_point(|rest| rest.distance > distance);
+            let end = piece.rests.len().min(first + 1);
+            &piece.rests[first.saturating_sub(1)..end]
+        } else {
+            &piece.rests
+        };
+        self.between(rests, |rest| rest.distance, distance)
     }
 
     /// Compliance of the lever at rest, in the model's units.
@@ -303,17 +317,17 @@ impl StaticCurve {
         }
     }
 
-    /// The first rest of a piece at which a quantity has a value.
+    /// The first place between rests of a piece at which a quantity has a value.
     pub(super) fn between(
         &self,
-        piece: &Piece,
+        rests: &[Rest],
         of: impl Fn(&Rest) -> f64,
         value: f64,
     ) -> Option<Rest> {
-        if let Some(rest) = piece.rests.iter().find(|rest| of(rest) == value) {
+        if let Some(rest) = rests.iter().find(|rest| of(rest) == value) {
             return Some(*rest);
         }
-        let mut pairs = piece.rests.windows(2);
+        let mut pairs = rests.windows(2);
         let pair = pairs.find(|pair| (of(&pair[0]) - value) * (of(&pair[1]) - value) < 0.0)?;
         Some(match self {
             Self::Linear(_) => {
@@ -493,31 +507,40 @@ impl LawRests {
         (rest, [1.0 - self.compliance * force.by_gap, force.by_gap])
     }
 
-    /// The rest between two, at which `of` changes its sign.
-    fn root(&self, a: &Rest, b: &Rest, of: impl Fn(&Rest, [f64; 2]) -> f64) -> Rest {
+    /// The rest between two, at which `of` changes its sign, to the last digit: the method of Chandrupatla
+    /// (Adv. Eng. Software 28, 1997), inverse quadratic interpolation where it is sure to help, else halving.
+    fn root(&self, one: &Rest, other: &Rest, of: impl Fn(&Rest, [f64; 2]) -> f64) -> Rest {
         let at = |gap: f64| {
-            let (rest, slopes) = self.rest(a.branch, gap);
+            let (rest, slopes) = self.rest(one.branch, gap);
             (rest, of(&rest, slopes))
         };
-        let (mut low, mut high) = (at(a.gap), at(b.gap));
+        // The zero is between `a` and `b`; `c` is the point before.
+        let (mut a, mut b) = (at(one.gap), at(other.gap));
+        let mut part = 0.5;
         for _ in 0..200 {
-            let middle = 0.5 * (low.0.gap + high.0.gap);
-            let (least, most) = (low.0.gap.min(high.0.gap), low.0.gap.max(high.0.gap));
-            if middle <= least || middle >= most {
+            let next = at(a.0.gap + part * (b.0.gap - a.0.gap));
+            let c = if next.1 * a.1 > 0.0 {
+                a
+            } else {
+                std::mem::replace(&mut b, a)
+            };
+            a = next;
+            let width = (b.0.gap - a.0.gap).abs();
+            let least = f64::EPSILON * a.0.gap.abs().max(b.0.gap.abs()) / width;
+            if a.1 == 0.0 || !(least < 0.5) {
                 break;
             }
-            let middle = at(middle);
-            if middle.1 * low.1 > 0.0 {
-                low = middle;
-            } else {
-                high = middle;
+            let xi = (a.0.gap - b.0.gap) / (c.0.gap - b.0.gap);
+            let phi = (a.1 - b.1) / (c.1 - b.1);
+            part = 0.5;
+            if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+                let by_b = a.1 / (b.1 - a.1) * c.1 / (b.1 - c.1);
+                let ratio = (c.0.gap - a.0.gap) / (b.0.gap - a.0.gap);
+                part = by_b + ratio * a.1 / (c.1 - a.1) * b.1 / (c.1 - b.1);
             }
+            part = part.clamp(least, 1.0 - least);
         }
-        if low.1.abs() < high.1.abs() {
-            low.0
-        } else {
-            high.0
-        }
+        if a.1.abs() < b.1.abs() { a.0 } else { b.0 }
     }
 
     fn pieces(&self, near: f64, far: f64) -> Vec<Piece> {
@@ -556,8 +579,7 @@ impl LawRests {
         let outwards = reach(1.0, &|distance| distance >= far);
         let inwards = reach(-1.0, &|distance| distance <= near);
         let mut gaps = Vec::with_capacity(2 * POINTS + 4);
-        for k in 0..=POINTS {
-            let part = nanotap_arithmetic::powf(NEAR, k as f64 / POINTS as f64);
+        for part in PARTS.iter() {
             gaps.push(contact + outwards * part);
             gaps.push(contact - inwards * part);
         }

@@ -28,6 +28,7 @@ use crate::fit::terms::Term;
 use held::{HeldRow, Loop};
 pub(super) use rest::MAX_RINGING;
 use rest::Nearby;
+pub(super) use rest::Rested;
 
 use nanotap_scan::force_curve::StableRest;
 

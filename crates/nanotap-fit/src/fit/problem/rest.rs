@@ -74,6 +74,19 @@ impl Rested {
         Some(reading(&rest, Some(quantity)))
     }
 
+    /// A quantity at a distance that is this part of the range of the rows before the nearest one, of the
+    /// lever that is pushed on from there.
+    pub(in crate::fit) fn beyond(&self, quantity: RestQuantity, part: f64) -> Option<f64> {
+        let [near, far] = self.rows;
+        let at = near - part * (far - near);
+        let chains = self.lever.chains(self.between(part * (far - near)));
+        let rest = chains
+            .iter()
+            .rev()
+            .find_map(|chain| self.lever.at(chain, at))?;
+        Some(reading(&rest, Some(quantity)))
+    }
+
     fn with_chains(self) -> (RestLever, Vec<Chain>) {
         let chains = self.lever.chains(self.between(0.0));
         (self.lever, chains)

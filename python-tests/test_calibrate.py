@@ -1,11 +1,15 @@
 """Thermal calibration: the closed form of equipartition, tables and files, and refusals."""
 
+import inspect
+import re
+import subprocess
 from pathlib import Path
 
 import nanotap
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from program import PROGRAM
 
 CASES = Path(__file__).resolve().parent.parent / "docs" / "cases"
 F0, Q, K = 75e3, 60.0, 2.8
@@ -67,10 +71,22 @@ def test_a_file_and_its_table_are_the_same():
     assert any("82.00 kHz" in warning for warning in of_file.warnings)
 
 
+def test_the_options_are_those_of_the_terminal():
+    run = [PROGRAM, "calibrate", "--help"]
+    text = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    terminal = set(re.findall(r"^\s+(?:-\w, )?--([a-z-]+)", text, re.MULTILINE))
+    terminal -= {"json", "quiet", "force", "out", "plot", "help"}
+    data, *options = inspect.signature(nanotap.calibrate).parameters
+    assert data == "data"
+    assert {one.rstrip("_").replace("_", "-") for one in options} == terminal
+    described = inspect.getdoc(nanotap.calibrate)
+    assert all(f"    {one}: " in described for one in options)
+
+
 def test_faulty_requests_are_refused(columns):
     with pytest.raises(ValueError, match="not that of a spectral density"):
         nanotap.calibrate(columns, unit="N")
-    with pytest.raises(ValueError, match="sensitivty"):
+    with pytest.raises(TypeError, match="sensitivty"):
         nanotap.calibrate(columns, sensitivty="40 nm/V")
     with pytest.raises(ValueError, match="neither a time nor a frequency"):
         nanotap.calibrate({"distance (nm)": [1.0, 2.0]})

@@ -14,3 +14,5 @@ frame["Amp (nm)"].mean()
 curves.to_netcdf("map.nc")
 # A misspelt option.
 nanotap.attractors(case, startz=8)  # type: ignore[call-arg]
+calibrated = nanotap.calibrate("lever.tnd", temperature=25, to="200 kHz")
+nanotap.calibrate("lever.tnd", temperatur=25)  # type: ignore[call-arg]

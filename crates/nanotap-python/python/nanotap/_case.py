@@ -34,6 +34,9 @@ _OTHER_NAMES = {
 # Entries of `to_dict` that follow from the keys.
 _FOLLOWS = {"period", "physical"}
 
+# Each fixes the distance of a physical case: a new one replaces the other.
+_FIX_THE_DISTANCE = {"gap.tip", "drive.setpoint"}
+
 # Entries of the document that do not depend on the distance.
 _WITHOUT_DISTANCE = {"kind", "modes", "contact", "actuation", "cosine_term"}
 
@@ -67,6 +70,8 @@ class Case:
     ... )
     >>> round(case.alpha4, 2)
     21.43
+    >>> case.drive.free_amplitude, case["gap.tip"]
+    ('20 nm', '10 nm')
 
     Raises:
         ValueError: a key or value is invalid; the message names it and a remedy.
@@ -117,7 +122,11 @@ class Case:
 
     @classmethod
     def from_toml(cls, text: str, *, name: str = "case", **keys: Value) -> "Case":
-        """The case of a TOML text, called `name` in error messages."""
+        """The case of a TOML text, called `name` in error messages.
+
+        >>> Case.from_toml(Case.paper().to_toml()) == Case.paper()
+        True
+        """
         if not isinstance(text, str):
             message = f"text: expected a TOML text, got {text!r}"
             raise TypeError(message)
@@ -125,7 +134,11 @@ class Case:
 
     @classmethod
     def paper(cls, **keys: Value) -> "Case":
-        """The paper's parameters for Figs. 5–17, Eq. (26), with α₁ = 0.1 and Ω = 2.6."""
+        """The paper's parameters for Figs. 5–17, Eq. (26), with α₁ = 0.1 and Ω = 2.6.
+
+        >>> Case.paper(omega=20).drive_frequency
+        20.0
+        """
         own: dict[str, Value] = {
             "modes": 3,
             "alpha1": 0.1,
@@ -150,15 +163,21 @@ class Case:
         mapping, as in `case.with_({"gap.tip": "12 nm"})`. Numbers that are not stated
         follow: of a case with `free_amplitude` the drive follows a new frequency. In the
         arguments of a study a key varies alone: there the drive's own amplitude stays.
+        A distance replaces a setpoint, and a setpoint a distance, here and there.
+
+        >>> Case.paper().with_(omega=3, alpha4=None).alpha4
+        0.0
         """
         keys = {**(changes or {}), **keys}
         in_model = self._core.model_units if model_units is None else _flag(model_units)
         if not keys and in_model == self._core.model_units:
             return self
         source, _, catalogues, folder = self._core.made_of
-        texts = self._keys | key_words(keys, self.kind)
+        new = key_words(keys, self.kind)
+        replaced = _FIX_THE_DISTANCE if _FIX_THE_DISTANCE & new.keys() else set()
+        kept = {key: text for key, text in self._keys.items() if key not in replaced}
         return _again(
-            type(self), source, texts, catalogues, os.fspath(folder), in_model
+            type(self), source, kept | new, catalogues, os.fspath(folder), in_model
         )
 
     def _varied(self, keys: Mapping[str, Value]) -> "Case":
@@ -296,15 +315,35 @@ class Case:
 
     def __getitem__(self, name: str) -> Any:
         name = name if name in self._document else _OTHER_NAMES.get(name, name)
-        if name in _WITHOUT_DISTANCE or name not in self._document:
+        if name in _WITHOUT_DISTANCE:
             return self._document[name]
-        return self._solved[name]
+        if name in self._document:
+            return self._solved[name]
+        table, _, key = name.partition(".")
+        stated = self._tables.get(table, {})
+        if key in stated:
+            return stated[key]
+        if key or not stated:
+            raise KeyError(name)
+        return Record(stated)
+
+    @property
+    def _tables(self) -> dict[str, Any]:
+        """What was stated of a physical case, by table and key."""
+        stated = self.inputs if self.is_physical else {}
+        return {
+            name: table for name, table in stated.items() if isinstance(table, dict)
+        }
+
+    def _ipython_key_completions_(self) -> list[str]:
+        tables = self._tables.items()
+        return [*self, *(f"{table}.{key}" for table, keys in tables for key in keys)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._document)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self._document})
+        return sorted({*super().__dir__(), *self._document, *self._tables})
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Case):

@@ -2,8 +2,8 @@
 
 import json
 import os
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
@@ -567,17 +567,84 @@ def fit_map(
 
 
 @stoppable()
-def calibrate(data: Any, **options: Any) -> Report:
+def calibrate(
+    data: Any,
+    *,
+    spectrum: str | int | None = None,
+    column: str | None = None,
+    unit: str | None = None,
+    rate: float | str | None = None,
+    two_sided: bool = False,
+    averages: float | None = None,
+    average: Literal["auto", "powers", "amplitudes"] = "auto",
+    window: Literal["auto", "none", "hann", "blackman"] = "auto",
+    segment: int | None = None,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    exclude: Sequence[str] | None = None,
+    frequency: float | str | None = None,
+    temperature: float | None = None,
+    temperature_error: float = 0.0,
+    sensitivity: float | str | None = None,
+    sensitivity_error: float | str | None = None,
+    factor: float | None = None,
+    factor_error: float | str | None = None,
+    spot: float = 1.0,
+    tilt: float | str | None = None,
+    length: float | str | None = None,
+    width: float | str | None = None,
+    dimension_error: float | str | None = None,
+    fluid: Literal["auto", "air", "water"] = "auto",
+    density: float | str | None = None,
+    viscosity: float | str | None = None,
+    reference: str | None = None,
+) -> Report:
     """Calibrates a lever from its thermal noise: spring constant, quality factor, resonance frequency,
     sensitivity.
+
+    Quantities are texts with their unit or numbers in SI.
 
     Args:
         data: A spectrum or a record of the deflection: the path of an instrument's file or of a table, or
             a table: a mapping or data frame with columns such as "frequency (kHz)" and
             "PSD (pm^2/Hz)", or "time (s)" and "deflection (V)".
-        **options: Options of `nanotap calibrate`, with underscores: `temperature` (°C),
-            `sensitivity="40 nm/V"`, `averages`, `average`, `from_="8 kHz"`, `to`, `factor`, `tilt`,
-            `length`, `width`, `fluid` …; `nanotap calibrate --help` describes all of them.
+        spectrum: Spectrum of the file, by its name or counted from 0; default: `average`, else the
+            first.
+        column: Column of a table with the density or the deflection; default: the first with such a
+            unit.
+        unit: Unit of the density, as in "pm^2/Hz" or "V/sqrt(Hz)", or of the deflection, where the
+            file states none.
+        rate: Sampling rate of a record without times, as in "1 MHz".
+        two_sided: The density is two-sided: half as high as a one-sided one.
+        averages: Number of averaged periodograms; default: as the file states, else from the scatter.
+        average: What was averaged; `amplitudes`: the density is low by π/4; `auto`: as the instrument
+            does.
+        window: Window of the periodograms; `auto`: Hann for a record; for a spectrum the correlation of
+            its bins is estimated.
+        segment: Samples of a segment of a record, a power of two; default: an eighth of the record.
+        from_: Lower end of the fit, as in "8 kHz"; default: 0.3 f0, nearer for a narrow peak.
+        to: Upper end of the fit; default: 2.2 f0, nearer for a narrow peak.
+        exclude: Ranges that the fit leaves out, as in ["49 kHz:51 kHz"].
+        frequency: Approximate resonance frequency; default: the highest peak in power per octave.
+        temperature: Temperature of the lever, °C; default: as the file states, else 25.
+        temperature_error: Standard error of the temperature, K.
+        sensitivity: Sensitivity (InvOLS) of a spectrum in V, as in "40 nm/V"; default: as the file
+            states.
+        sensitivity_error: Relative standard error of the sensitivity, as in "3 %".
+        factor: Factor k m/(kB T) that replaces 0.817, the one of a bare rectangular lever with a small
+            light spot at its end.
+        factor_error: Relative standard error of the factor, as in "5 %".
+        spot: Position of the light spot from the clamp, as a fraction of the length.
+        tilt: Angle between lever and sample, as in "11 deg": k along the sample's normal is reported
+            too.
+        length: Length of the rectangular lever for Sader's method, as in "225 um".
+        width: Width of the rectangular lever for Sader's method.
+        dimension_error: Relative standard error of length and width, as in "2 %".
+        fluid: Fluid around the lever for Sader's method; `auto`: as the file states, else air.
+        density: Density of another fluid, as in "785 kg/m^3".
+        viscosity: Viscosity of another fluid, as in "2 mPa s".
+        reference: Calibrated lever of the same shape for Sader's method, k,f0,Q as in
+            "2.8 N/m,75 kHz,180".
 
     Returns:
         The document. `stiffness`, `quality`, `frequency`, `sader.stiffness` and `sensitivity` have
@@ -596,8 +663,13 @@ def calibrate(data: Any, **options: Any) -> Report:
         >>> print(f"{found.quality.value:.2f}, {found.frequency.value:.0f} Hz")
         50.00, 75000 Hz
     """
+    options = {name: value for name, value in locals().items() if name != "data"}
+    if isinstance(spectrum, int):
+        options["spectrum"] = str(spectrum)
+    if isinstance(exclude, str):
+        options["exclude"] = [exclude]
     request = {
-        "from" if name == "from_" else name: written(value)
+        name.rstrip("_"): written(value)
         for name, value in options.items()
         if value is not None
     }

@@ -241,3 +241,48 @@ def test_a_force_curve_is_a_file_columns_or_rows(tmp_path):
                 "table": {"gap (nm)": [0, 1, 0.5], "force (nN)": [1, 0, 0]},
             },
         )
+
+
+SETPOINT = {
+    "cantilever": {"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    "sample": {"stiffness": "5 N/m"},
+    "drive": {
+        "actuation": "tip",
+        "frequency_ratio": 1,
+        "free_amplitude": "10 nm",
+        "setpoint": 0.8,
+    },
+}
+
+
+def test_a_distance_replaces_a_setpoint_in_with_and_in_calls():
+    case = nanotap.Case(**SETPOINT)
+    distance = {"gap.tip": "8.5 nm"}
+    moved = case.with_(distance)
+    assert moved.inputs["gap"] == {"tip": "8.5 nm"}
+    assert "setpoint" not in moved.inputs["drive"]
+    found = nanotap.orbit(moved).first_harmonic
+    assert nanotap.orbit(case, **distance).first_harmonic == pytest.approx(found)
+    # And back: another setpoint replaces the distance.
+    back = moved.with_({"drive.setpoint": 0.7})
+    assert "gap" not in back.inputs
+    assert nanotap.orbit(back).first_harmonic == pytest.approx(7e-9, rel=1e-6)
+    again = nanotap.orbit(case, **{"drive.setpoint": 0.7})
+    assert again.first_harmonic == pytest.approx(7e-9, rel=1e-6)
+    with pytest.raises(ValueError, match="cannot both be given"):
+        case.with_({"gap.tip": "8 nm", "drive.setpoint": 0.7})
+
+
+def test_completion_offers_the_keys_of_a_physical_case():
+    case = nanotap.Case(**SETPOINT)
+    keys = case._ipython_key_completions_()
+    assert {"sample.stiffness", "drive.setpoint", "alpha4", "physical"} <= set(keys)
+    assert {"cantilever", "sample", "drive"} <= set(dir(case))
+    assert all(case[key] is not None or key in case for key in keys)
+    assert case["drive.free_amplitude"] == case.drive.free_amplitude == "10 nm"
+    assert "f0" in dir(case.cantilever)
+    for wrong in ("drive.frequency", "drive.", "gap.tip", "nothing.k", "nothing"):
+        with pytest.raises(KeyError, match=wrong):
+            case[wrong]
+    dimensionless = nanotap.Case.paper()
+    assert dimensionless._ipython_key_completions_() == list(dimensionless)

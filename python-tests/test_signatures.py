@@ -1,13 +1,16 @@
 """Functions agree with the library's declarations: names, defaults and documentation."""
 
+import builtins
+import doctest
 import importlib.util
 import inspect
 import json
 from pathlib import Path
 
+import matplotlib.pyplot
 import nanotap
 import pytest
-from nanotap import _nanotap
+from nanotap import _nanotap, export, plot
 
 _WRITER = Path(__file__).parents[1] / "crates" / "nanotap-python" / "signatures.py"
 _SPEC = importlib.util.spec_from_file_location("signatures", _WRITER)
@@ -64,20 +67,39 @@ def test_contact_laws_compares_the_samples(regular):
     assert len(found.samples) >= 2
 
 
-def test_examples_in_docstrings_hold():
-    """Every function of a study has an example, but those that need measured data or a scan."""
-    import doctest
+def public():
+    """Every public function, the classes with which a study begins, and the package, by name."""
+    found = {name: getattr(nanotap, name) for name in {*nanotap.__all__, "open"}}
+    found |= {f"plot.{name}": getattr(plot, name) for name in plot.__all__}
+    found |= {
+        f"export.{name}": one
+        for name, one in vars(export).items()
+        if not name.startswith("_")
+        and getattr(one, "__module__", "") == export.__name__
+    }
+    found = {name: one for name, one in found.items() if inspect.isfunction(one)}
+    for name in ("Case", "Map", "Report", "range"):
+        found[name] = getattr(nanotap, name)
+    return found | {"package": nanotap, "export": export}
 
-    from nanotap import _case, _map, _quantity, _signatures
 
-    finder, runner = doctest.DocTestFinder(recurse=True), doctest.DocTestRunner()
-    tested = set()
-    for module in (_signatures, _case, _map, _quantity):
-        globs = {**vars(module), "nanotap": nanotap}
-        for test in finder.find(module, globs=globs):
-            if test.examples:
-                tested.add(test.name.rsplit(".", 1)[-1])
-                runner.run(test)
-    assert runner.summarize().failed == 0
-    without = set(_signatures.__all__) - tested
-    assert without <= {"fit", "reconstruct", "scan"}, without
+@pytest.mark.parametrize("name", sorted(public()))
+def test_a_public_function_has_an_example_that_holds(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    one = public()[name]
+    module = inspect.getmodule(inspect.unwrap(one))
+    finder = doctest.DocTestFinder(recurse=inspect.isclass(one))
+    names = {**vars(module), "nanotap": nanotap}
+    tests = finder.find(one, name, module=module, globs=names)
+    examples = [example for test in tests for example in test.examples]
+    assert examples, f"{name} has no example"
+    assert not any(doctest.SKIP in example.options for example in examples)
+    runner = doctest.DocTestRunner()
+    failed = [test.name for test in tests if runner.run(test).failed]
+    assert not failed
+    matplotlib.pyplot.close("all")
+
+
+def test_import_all_hides_no_builtin():
+    assert not set(nanotap.__all__) & set(dir(builtins))
+    assert {"open", "range"} <= set(dir(nanotap))

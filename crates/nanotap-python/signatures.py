@@ -306,6 +306,36 @@ array([0.0149, 2.8522, 4.4282])
 >>> print(f"{last.tones[1].frequency_shift:.1f} Hz, {last.estimates.reduced_modulus:.3e} Pa by the formula")
 1035.7 Hz, 1.120e+09 Pa by the formula
 """,
+    "fit": f"""
+{LEVER}
+>>> zc = [7e-9, 8e-9, 9e-9]
+>>> seen = nanotap.orbit(lever, **{{"gap.tip": zc}})
+>>> measured = {{"zc (m)": zc, "A (m)": seen.first_harmonic, "phase": seen.phase}}
+>>> guess = lever.with_({{"sample.stiffness": "8 N/m"}})
+>>> found = nanotap.fit(guess, data=measured, free=["sample.stiffness"], progress=False)
+>>> print(f"{{found.best['sample.stiffness']:.3f}} N/m")
+5.000 N/m
+""",
+    "reconstruct": f"""
+>>> import numpy as np
+{LEVER}
+>>> zc = np.linspace(6e-9, 11e-9, 20)
+>>> seen = nanotap.orbit(lever, **{{"gap.tip": zc}})
+>>> measured = {{"zc (m)": zc, "A (m)": seen.first_harmonic, "phase": seen.phase}}
+>>> curve = nanotap.reconstruct(lever, data=measured, progress=False).curve()
+>>> print(f"{{curve.force.iloc[0]:.2e}} N at an indentation of {{-curve.index[0]:.2e}} m")
+1.31e-09 N at an indentation of 2.61e-10 m
+""",
+    "scan": f"""
+{LEVER}
+>>> ds = nanotap.scan(
+...     lever, size="100 nm", periods=4000, pixels=5, settle=300, setpoint=0.8, z0="8 nm",
+...     integral_gain=1500, lock_in={{"time_constant": "20 us", "order": 1}}, progress=False,
+...     surface=[{{"step": {{"from": "30 nm", "to": "70 nm", "height": "2 nm"}}}}],
+... )
+>>> (1e9 * ds.height.sel(direction="trace")).values.round(1).tolist()
+[[7.7, 8.8, 9.7, 8.9, 7.7]]
+""",
     "lever": """
 >>> gel = nanotap.Case(
 ...     modes=1,

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 
 from . import _signatures
 from ._case import Case, catalogue
-from ._datasets import merge, open
+from ._datasets import merge
+from ._datasets import open as open
 from ._interrupt import Interrupted
 from ._map import Map, Motion, PeriodicOrbit
 from ._nanotap import __version__
@@ -40,7 +41,7 @@ from ._si import in_si
 from ._signatures import *
 from ._studies import calibrate, fit_map, paper
 
-# Not in `__all__`: `import *` would hide the builtin.
+# Like `open` not in `__all__`: `import *` would hide the builtin.
 range = Range
 
 if TYPE_CHECKING:
@@ -72,7 +73,6 @@ __all__ = [
     "fit_map",
     "in_si",
     "merge",
-    "open",
     "paper",
     "plot",
     "read",
@@ -99,4 +99,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*__all__, "open", "range"])

@@ -244,14 +244,20 @@ _written = json.JSONEncoder(allow_nan=False).encode
 
 
 class _Option(NamedTuple):
-    """JSON types that an option takes, and the type of an array's entries."""
+    """JSON types that an option takes, the type of an array's entries, and whether an object has fields
+    of its own, not sides of a box."""
 
     kinds: frozenset[str]
     entries: str | None
+    has_fields: bool
 
     @classmethod
     def of(cls, schema: Mapping[str, Any]) -> "_Option":
-        return cls(frozenset(_kinds(schema)), schema.get("items", {}).get("type"))
+        items = schema.get("items", {})
+        inner = _kinds(items)
+        found = (kind for kind in ("string", "object") if kind in inner)
+        entries = next(found, items.get("type"))
+        return cls(frozenset(_kinds(schema)), entries, "properties" in schema)
 
 
 @cache
@@ -307,6 +313,11 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
         value = written(value)
     if "boolean" in kinds:
         return flag(name, value)
+    if "object" in kinds and takes.has_fields:
+        if not isinstance(value, Mapping):
+            message = f"{name}: expected a dictionary, got {value!r}"
+            raise TypeError(message)
+        return {str(field): written(one) for field, one in value.items()}
     if "object" in kinds:
         if isinstance(value, str | list) and "string" in kinds:
             return value

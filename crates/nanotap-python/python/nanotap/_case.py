@@ -110,6 +110,11 @@ class Case:
 
         `catalogue` names files with further levers and materials; with `model_units` results of
         a physical case are in the model's units.
+
+        >>> with open("case.toml", "w") as file:
+        ...     size = file.write(Case.paper().to_toml())
+        >>> Case.from_file("case.toml", omega=20).omega
+        20.0
         """
         case = cls.__new__(cls)
         case._keys = key_words(keys)
@@ -165,8 +170,8 @@ class Case:
         arguments of a study a key varies alone: there the drive's own amplitude stays.
         A distance replaces a setpoint, and a setpoint a distance, here and there.
 
-        >>> Case.paper().with_(omega=3, alpha4=None).alpha4
-        0.0
+        >>> Case.paper().with_(omega=3).omega
+        3.0
         """
         keys = {**(changes or {}), **keys}
         in_model = self._core.model_units if model_units is None else _flag(model_units)
@@ -319,13 +324,13 @@ class Case:
             return self._document[name]
         if name in self._document:
             return self._solved[name]
+        tables = self._tables
+        if name in tables:
+            return Record(tables[name])
         table, _, key = name.partition(".")
-        stated = self._tables.get(table, {})
-        if key in stated:
-            return stated[key]
-        if key or not stated:
+        if key not in tables.get(table, {}):
             raise KeyError(name)
-        return Record(stated)
+        return tables[table][key]
 
     @property
     def _tables(self) -> dict[str, Any]:
@@ -419,7 +424,11 @@ class Case:
 
 
 def catalogue() -> "pd.DataFrame":
-    """The built-in levers and materials, usable by name, with their sources."""
+    """The built-in levers and materials, usable by name, with their sources.
+
+    >>> catalogue().query("kind == 'lever'").name.head(3).tolist()
+    ['AC160TS', 'AC200TS', 'AC240TS']
+    """
     import pandas as pd
 
     return pd.DataFrame(_nanotap.catalogue(), columns=["kind", "name", "source"])

@@ -92,6 +92,13 @@ def open(path: Path) -> "StudyDataset":
     Raises:
         FileNotFoundError: it does not exist.
         ValueError: it is not a dataset of nanotap.
+
+    >>> over = {"omega": nanotap.range(2.9, 3.1, 3)}
+    >>> ds = nanotap.sweep(
+    ...     nanotap.Case.paper(), over=over, periods=4, out="sweep.zarr", progress=False
+    ... )
+    >>> nanotap.open("sweep.zarr").period.values.ravel().tolist()
+    [2, 1, 1]
     """
     name = os.fspath(path)
     if not os.path.exists(name):
@@ -150,6 +157,14 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
 
     Raises:
         ValueError: one is not a dataset, or two do not belong together.
+
+    >>> case, over = nanotap.Case.paper(), {"omega": nanotap.range(2.9, 3.1, 4)}
+    >>> for share in "12":
+    ...     ds = nanotap.sweep(
+    ...         case, over=over, periods=2, out=f"share-{share}.zarr", chunk=f"{share}/2", progress=False
+    ...     )
+    >>> nanotap.merge(["share-1.zarr", "share-2.zarr"], "all.zarr").missing
+    []
     """
     if isinstance(sources, str | os.PathLike):
         message = "sources: expected a list of datasets"

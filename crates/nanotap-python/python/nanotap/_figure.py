@@ -93,6 +93,9 @@ def page(width: float, height: float, **grid: Any) -> Iterator[tuple[Picture, An
     """A page of `width` by `height` (mm) in the style of these figures, and its panels.
 
     `grid` is what `Figure.subplots` takes: `nrows`, `ncols`, `sharex` …
+
+    >>> with nanotap.plot.page(180, 80, ncols=2) as (figure, panels):
+    ...     lines = panels[0].plot([0, 1], [0, 1])
     """
     with mpl.rc_context(STYLE):
         picture = Picture(figsize=(width * _MM, height * _MM), layout="constrained")

@@ -64,6 +64,11 @@ def read(
     Raises:
         FileNotFoundError: it does not exist.
         ValueError: it is not such a file, has no such curve, or another package reads it.
+
+    >>> with open("curve.csv", "w") as file:
+    ...     size = file.write("distance (nm),amplitude (nm)\\n8,7.5\\n9,8.5\\n")
+    >>> nanotap.read("curve.csv")["amplitude (nm)"].tolist()
+    [7.5, 8.5]
     """
     name = existing(path)
     extension = os.path.splitext(name)[1].lower()

@@ -86,6 +86,17 @@ def in_si(ds: Described) -> Described:
 
     Raises:
         ValueError: the case is not physical.
+
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ...     model_units=True,
+    ... )
+    >>> run = nanotap.simulate(lever, periods=2)
+    >>> print(f"{run.tip_max.item():.3e} g0, {nanotap.in_si(run).tip_max.item():.3e} m")
+    8.270e-04 g0, 8.276e-09 m
     """
     units = _factors(json.loads(ds.attrs.get("case", "{}")))
     varies = not all(

@@ -723,6 +723,23 @@ def fit(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> zc = [7e-9, 8e-9, 9e-9]
+    >>> seen = nanotap.orbit(lever, **{"gap.tip": zc})
+    >>> measured = {"zc (m)": zc, "A (m)": seen.first_harmonic, "phase": seen.phase}
+    >>> guess = lever.with_({"sample.stiffness": "8 N/m"})
+    >>> found = nanotap.fit(guess, data=measured, free=["sample.stiffness"], progress=False)
+    >>> print(f"{found.best['sample.stiffness']:.3f} N/m")
+    5.000 N/m
     """
     options = _arguments.options("fit", locals())
     return _studies.fit(case, options, curve, threads, progress)
@@ -790,6 +807,23 @@ def reconstruct(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> import numpy as np
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> zc = np.linspace(6e-9, 11e-9, 20)
+    >>> seen = nanotap.orbit(lever, **{"gap.tip": zc})
+    >>> measured = {"zc (m)": zc, "A (m)": seen.first_harmonic, "phase": seen.phase}
+    >>> curve = nanotap.reconstruct(lever, data=measured, progress=False).curve()
+    >>> print(f"{curve.force.iloc[0]:.2e} N at an indentation of {-curve.index[0]:.2e} m")
+    1.31e-09 N at an indentation of 2.61e-10 m
     """
     options = _arguments.options("reconstruct", locals())
     return _studies.reconstruct(case, options, threads, progress)
@@ -1458,6 +1492,23 @@ def scan(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> ds = nanotap.scan(
+    ...     lever, size="100 nm", periods=4000, pixels=5, settle=300, setpoint=0.8, z0="8 nm",
+    ...     integral_gain=1500, lock_in={"time_constant": "20 us", "order": 1}, progress=False,
+    ...     surface=[{"step": {"from": "30 nm", "to": "70 nm", "height": "2 nm"}}],
+    ... )
+    >>> (1e9 * ds.height.sel(direction="trace")).values.round(1).tolist()
+    [[7.7, 8.8, 9.7, 8.9, 7.7]]
     """
     options = _arguments.options("scan", locals())
     return _studies.scan(case, options, out, chunk, threads, client, progress)

@@ -536,11 +536,23 @@ def fit_map(
             the whole dataset with the rest missing.
 
     Example:
-        >>> import nanotap
-        >>> ds = nanotap.fit_map("cells.jpk-qi-data", tip_radius="5 um")  # doctest: +SKIP
-        >>> ds["sample.modulus"].median()  # doctest: +SKIP
-        >>> case = nanotap.Case.from_file("lever.toml")  # doctest: +SKIP
-        >>> ds = nanotap.fit_map(case, "volume.csv", ["x", "y"], "sample.modulus")  # doctest: +SKIP
+        >>> import numpy as np
+        >>> lever = nanotap.Case(
+        ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+        ...     sample={"stiffness": "5 N/m"},
+        ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+        ...     gap={"tip": "8 nm"},
+        ... )
+        >>> zc = np.array([7e-9, 8e-9, 9e-9])
+        >>> amplitude = nanotap.orbit(lever, **{"gap.tip": zc}).first_harmonic.values
+        >>> volume = {
+        ...     "x": np.repeat([0, 1], 3),
+        ...     "zc (m)": np.tile(zc, 2),
+        ...     "A (m)": np.tile(amplitude, 2),
+        ... }
+        >>> ds = nanotap.fit_map(lever, volume, ["x"], "sample.stiffness", progress=False)
+        >>> ds["sample.stiffness"].values.round(3)
+        array([5., 5.])
     """
     if data is None:
         case, data = None, case
@@ -726,6 +738,11 @@ def paper(
     Raises:
         ValueError: a section does not exist.
         Interrupted: Ctrl-C; its `result` is the report of the finished sections.
+
+    Example:
+        >>> report = nanotap.paper(only="eq25", quick=True, progress=False)
+        >>> [check.verdict for check in report.checks]
+        ['reproduced', 'ambiguous', 'reproduced']
     """
     sections = [only] if isinstance(only, str) else [str(name) for name in only]
     with bar(progress, "%") as hears, stoppable():

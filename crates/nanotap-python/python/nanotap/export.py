@@ -29,6 +29,10 @@ def table(result: Any) -> pd.DataFrame:
     The rows are the initial states of a sweep, the points of a basin, branch or approach curve,
     or the instants of a run or orbit; attractors, modes, convergence and paper have their own
     tables.
+
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> nanotap.export.table(nanotap.modes(case)).columns.tolist()
+    ['free', 'exact_free', 'contact', 'exact_contact']
     """
     if isinstance(result, Attractors | Convergence | Modes | Paper):
         return result.table()
@@ -78,6 +82,8 @@ def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
 def csv(result: Any, path: Path) -> None:
     """A result as CSV: the terminal's file, byte for byte. What xarray made of a result, such as a
     selection of an approach curve, and results over arrays have that of `table`.
+
+    >>> nanotap.export.csv(nanotap.modes(nanotap.Case.paper()), "modes.csv")
     """
     text = _terminal_file(result)
     if text is None:
@@ -131,14 +137,20 @@ def _grid(ds: "xr.Dataset", dims: tuple[str, ...]) -> str:
 
 
 def parquet(result: Any, path: Path) -> None:
-    """The table of a result as Parquet; needs pyarrow."""
+    """The table of a result as Parquet; needs pyarrow.
+
+    >>> nanotap.export.parquet(nanotap.modes(nanotap.Case.paper()), "modes.parquet")
+    """
     frame = table(result).reset_index()
     _written(path, lambda name: frame.to_parquet(name, engine="pyarrow", index=False))
 
 
 def hdf5(result: Any, path: Path) -> None:
     """An orbit or a Dataset as HDF5: one array per variable, `long_name` and `units` as
-    attributes, the case as JSON in the attribute `case`; needs h5py."""
+    attributes, the case as JSON in the attribute `case`; needs h5py.
+
+    >>> nanotap.export.hdf5(nanotap.orbit(nanotap.Case.paper(omega=3)), "orbit.h5")
+    """
     import h5py
 
     if isinstance(result, Orbit):
@@ -210,6 +222,10 @@ def gsf(
 
     Raises:
         ValueError: the map does not exist, or its axes are not equidistant and ascending.
+
+    >>> over = {"omega": [2.9, 3.0], "alpha4": nanotap.range(19, 20, 2)}
+    >>> ds = nanotap.sweep(nanotap.Case.paper(), over=over, periods=2, progress=False)
+    >>> nanotap.export.gsf(ds, "map.gsf", variable="tip_max")
     """
     name = variable or ("attractor" if "attractor" in ds else "amplitude")
     if name not in ds:
@@ -261,6 +277,11 @@ def netcdf(ds: "xr.Dataset", path: Path, **options: Any) -> None:
         ds: The Dataset.
         path: The file, with the extension .nc.
         **options: Options of `Dataset.to_netcdf`.
+
+    >>> ds = nanotap.sweep(
+    ...     nanotap.Case.paper(), over={"omega": nanotap.range(2.9, 3.1, 3)}, periods=4, progress=False
+    ... )
+    >>> nanotap.export.netcdf(ds, "sweep.nc")
     """
     _written(path, lambda target: ds.to_netcdf(target, **options))
 

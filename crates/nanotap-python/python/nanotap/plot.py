@@ -161,7 +161,10 @@ def _motion(
 def run(
     ds: "xr.Dataset", *, periods: float | None = None, **where: Unpack[Where]
 ) -> "Figure":
-    """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
+    """A run of `simulate`: time series with the contacts shaded, and phase portrait.
+
+    >>> figure = nanotap.plot.run(nanotap.simulate(nanotap.Case.paper(omega=3), periods=4))
+    """
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
         message = "the run has no time series; omit series="
         raise ValueError(message)
@@ -184,12 +187,20 @@ def run(
 
 
 def orbit(orbit: "Orbit", **where: Unpack[Where]) -> "Figure":
-    """An orbit: time series, phase portrait, harmonics, multipliers."""
+    """An orbit: time series, phase portrait, harmonics, multipliers.
+
+    >>> figure = nanotap.plot.orbit(nanotap.orbit(nanotap.Case.paper(omega=3)))
+    >>> figure.savefig("orbit.pdf")
+    """
     return orbit.plot(**where)
 
 
 def attractors(found: "Attractors", **where: Unpack[Where]) -> "Figure":
-    """Phase portraits and strobe points of every attractor, in different colours."""
+    """Phase portraits and strobe points of every attractor, in different colours.
+
+    >>> found = nanotap.attractors(nanotap.Case.paper(omega=3), starts=8, progress=False)
+    >>> figure = nanotap.plot.attractors(found)
+    """
     return found.plot(**where)
 
 
@@ -278,6 +289,9 @@ def orbits(
 
     Raises:
         ValueError: the variable does not exist, or there are several parameters.
+
+    >>> ds = nanotap.orbit(nanotap.Case.paper(omega=3), omega=[2.95, 3.0])
+    >>> figure = nanotap.plot.orbits(ds, show="phase")
     """
     names = [name for name in json.loads(ds.attrs.get("over", "[]")) if name in ds.dims]
     if len(names) != 1:
@@ -291,7 +305,13 @@ def sweep(
     ds: "xr.Dataset", *, show: str | None = None, **where: Unpack[Where]
 ) -> "Figure":
     """A sweep: a bifurcation diagram over one parameter, a map of motions over two; with `show`
-    any variable over one parameter."""
+    any variable over one parameter.
+
+    >>> ds = nanotap.sweep(
+    ...     nanotap.Case.paper(), over={"omega": nanotap.range(2.9, 3.1, 3)}, periods=4, progress=False
+    ... )
+    >>> figure = nanotap.plot.sweep(ds, show="amplitude")
+    """
     if show is not None:
         names = [str(d) for d in ds.classification.dims if d != "start"]
         if len(names) != 1:
@@ -331,7 +351,12 @@ def sweep(
 
 
 def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
-    """Basins: one colour per attractor, with the strobe points of the attractors."""
+    """Basins: one colour per attractor, with the strobe points of the attractors.
+
+    >>> sides = {"x": {"a1": (-1, 1, 3)}, "y": {"v1": (-1, 1, 3)}}
+    >>> ds = nanotap.basin(nanotap.Case.paper(omega=3), **sides, progress=False)
+    >>> figure = nanotap.plot.basin(ds)
+    """
     y, x = (str(dim) for dim in ds.attractor.dims)
     recipe = json.loads(ds.attrs["basin"])
     facts = {
@@ -350,7 +375,11 @@ def branch(
 ) -> "Figure":
     """Branches against the parameter, one colour per period, with their bifurcations, and the
     bifurcation curves in two parameters, if they were traced; `show` is an observable, by default
-    that of the terminal."""
+    that of the terminal.
+
+    >>> ds = nanotap.branch(nanotap.Case.paper(omega=3), parameter="omega", from_=3, to=2.95, progress=False)
+    >>> figure = nanotap.plot.branch(ds, show="peak_force")
+    """
     if show is None and (figure := _whole(ds)) is not None:
         return draw(figure, **where)
     show = show or "tip_max"
@@ -421,6 +450,10 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
 
     Under frequency modulation: frequency shift, drive, dissipated energy, and the force from
     the shifts.
+
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> ds = nanotap.approach(case, points=3, branches=False, progress=False)
+    >>> figure = nanotap.plot.approach(ds, panels="ab")
     """
     if (figure := _whole(ds)) is not None:
         return draw(figure, **where)
@@ -537,32 +570,80 @@ def _point_of(
 
 
 def section(found: "Lyapunov", **where: Unpack[Where]) -> "Figure":
-    """A Poincaré section, and the exponents with their errors."""
+    """A Poincaré section, and the exponents with their errors.
+
+    >>> figure = nanotap.plot.section(nanotap.lyapunov(nanotap.Case.paper(omega=3)))
+    """
     return found.plot(**where)
 
 
 def fit(found: "Fit", **where: Unpack[Where]) -> "Figure":
-    """Measured curves, the fit through them, and the residuals."""
+    """Measured curves, the fit through them, and the residuals.
+
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> zc = [7e-9, 8e-9, 9e-9]
+    >>> seen = nanotap.orbit(lever, **{"gap.tip": zc})
+    >>> measured = {"zc (m)": zc, "A (m)": seen.first_harmonic, "phase": seen.phase}
+    >>> found = nanotap.fit(lever, data=measured, free="sample.stiffness", progress=False)
+    >>> figure = nanotap.plot.fit(found)
+    """
     return found.plot(**where)
 
 
 def reconstruct(found: "Reconstruction", **where: Unpack[Where]) -> "Figure":
-    """Reconstructed force and dissipation against distance."""
+    """Reconstructed force and dissipation against distance.
+
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> zc = np.linspace(6e-9, 11e-9, 20)
+    >>> seen = nanotap.orbit(lever, **{"gap.tip": zc})
+    >>> measured = {"zc (m)": zc, "A (m)": seen.first_harmonic, "phase": seen.phase}
+    >>> found = nanotap.reconstruct(lever, data=measured, progress=False)
+    >>> figure = nanotap.plot.reconstruct(found)
+    """
     return found.plot(**where)
 
 
 def modes(found: "Modes", **where: Unpack[Where]) -> "Figure":
-    """The mode shapes of the bare beam."""
+    """The mode shapes of the bare beam.
+
+    >>> figure = nanotap.plot.modes(nanotap.modes(nanotap.Case.paper(omega=3)))
+    """
     return found.plot(**where)
 
 
 def convergence(found: "Convergence", **where: Unpack[Where]) -> "Figure":
-    """Change of the tip deflection against the number of modes."""
+    """Change of the tip deflection against the number of modes.
+
+    >>> figure = nanotap.plot.convergence(nanotap.convergence(nanotap.Case.paper(omega=3), largest=3))
+    """
     return found.plot(**where)
 
 
 def scan(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
-    """A line or an image: height, amplitude error, phase, peak force."""
+    """A line or an image: height, amplitude error, phase, peak force.
+
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> ds = nanotap.scan(
+    ...     lever, size="100 nm", periods=500, pixels=5, settle=300, setpoint=0.8, z0="8 nm",
+    ...     integral_gain=1500, lock_in={"time_constant": "20 us", "order": 1}, progress=False,
+    ... )
+    >>> figure = nanotap.plot.scan(ds)
+    """
     if (figure := _whole(ds)) is not None:
         return draw(figure, **where)
     facts: dict[str, Any] = {}
@@ -587,7 +668,24 @@ def scan(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
 
 
 def fit_map(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
-    """A map of each fitted parameter of a force volume; of one row of pixels, its values."""
+    """A map of each fitted parameter of a force volume; of one row of pixels, its values.
+
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> zc = np.array([7e-9, 8e-9, 9e-9])
+    >>> amplitude = nanotap.orbit(lever, **{"gap.tip": zc}).first_harmonic.values
+    >>> volume = {
+    ...     "x": np.repeat([0, 1], 3),
+    ...     "zc (m)": np.tile(zc, 2),
+    ...     "A (m)": np.tile(amplitude, 2),
+    ... }
+    >>> ds = nanotap.fit_map(lever, volume, ["x"], "sample.stiffness", progress=False)
+    >>> figure = nanotap.plot.fit_map(ds)
+    """
 
     def column(name: str) -> dict[str, Any]:
         units = str(ds[name].attrs.get("units", "1"))
@@ -619,7 +717,10 @@ def _cells(values: Any) -> Any:
 
 
 def show(result: Any, **options: Any) -> "Figure":
-    """The figure of any result."""
+    """The figure of any result.
+
+    >>> figure = nanotap.plot.show(nanotap.orbit(nanotap.Case.paper(omega=3)))
+    """
     if isinstance(result, Answered):
         return result.plot(**options)
     draw_it: Callable[..., Figure]

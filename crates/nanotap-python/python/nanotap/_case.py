@@ -16,6 +16,8 @@ from ._record import Record
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ._explore import Explorer
+
 Path: TypeAlias = str | os.PathLike[str]
 Scalar: TypeAlias = "float | str | np.floating[Any] | np.integer[Any] | None"
 Table: TypeAlias = (
@@ -297,6 +299,21 @@ class Case:
         if self._core.model_units:
             stated["model_units"] = True
         return stated
+
+    def explore(self, *, browser: bool = False) -> "Explorer":
+        """Starts the explorer with this case. In a notebook on this machine the cell shows the page;
+        `browser` opens it in a browser. `.case` of the result is the case as the page shows it now.
+
+        >>> with Case.paper(omega=3).explore() as page:
+        ...     page.case.omega
+        3.0
+
+        Raises:
+            RuntimeError: the server did not start.
+        """
+        from ._explore import Explorer
+
+        return Explorer(self, browser)
 
     def to_dict(self) -> dict[str, Any]:
         """The whole document, as the terminal's `nanotap case --json`."""

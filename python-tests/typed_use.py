@@ -15,4 +15,4 @@ curves.to_netcdf("map.nc")
 # A misspelt option.
 nanotap.attractors(case, startz=8)  # type: ignore[call-arg]
 calibrated = nanotap.calibrate("lever.tnd", temperature=25, to="200 kHz")
-nanotap.calibrate("lever.tnd", temperatur=25)  # type: ignore[call-arg]
+nanotap.calibrate("lever.tnd", temperatures=25)  # type: ignore[call-arg]

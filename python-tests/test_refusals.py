@@ -10,6 +10,9 @@ import pytest
 NAN, INF = math.nan, math.inf
 
 REFUSED = [
+    ("scan", {"lock_in": "20 us"}, TypeError, "lock_in: expected a dictionary"),
+    ("scan", {"lock_in": {"time": "20 us"}}, ValueError, "lock_in: unknown field"),
+    ("scan", {"surface": [{"hill": 1}]}, ValueError, "surface: unknown variant"),
     ("simulate", {"periods": 0}, ValueError, "periods: 0 is out of range"),
     ("simulate", {"periods": -1}, ValueError, "periods: -1 is out of range"),
     ("simulate", {"periods": 2**64}, ValueError, "out of range"),

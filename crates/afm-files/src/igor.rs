@@ -1,9 +1,9 @@
-//! Igor binary waves of version 5, in which Asylum Research writes curves and images (WaveMetrics,
+//! Igor binary waves of version 5, in which Asylum Research writes curves, images and spectra (WaveMetrics,
 //! Technical Note 003): a header, numbers, a note of settings, the names of the channels.
 
 use crate::bytes::{Bytes, Encoding, Number};
 use crate::distance::{Names, finish};
-use crate::document::{Channel, Curve, Document, Image, Segment, Style};
+use crate::document::{Channel, Curve, Document, Image, Segment, Spectrum, Style};
 use crate::limits::{Budget, MAX_CHANNELS, MAX_HEADER, MAX_SEGMENTS, at_most};
 use crate::text::{number, until_zero, utf8_or_windows};
 use crate::{Error, Format, Limits};
@@ -68,6 +68,11 @@ struct Wave {
     shape: Vec<usize>,
     /// Step of each dimension.
     steps: [f64; 4],
+    /// Beginning and unit of the first dimension.
+    first: (f64, String),
+    name: String,
+    /// Unit of the numbers.
+    unit: String,
     values: Vec<f64>,
     note: Vec<(String, String)>,
     /// Names of the entries of each dimension.
@@ -102,10 +107,11 @@ pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {
             at_most(wave.shape[2], MAX_CHANNELS, "images in a file")?;
             document.images = images(&wave);
         }
+        1 if wave.first.1 == "Hz" => document.spectra.push(spectrum(&wave)),
         _ => {
             let content = format!("an Igor wave of {} numbers", wave.values.len());
-            let reason =
-                "only the curves and images of Asylum Research are read, whose channels have names";
+            let reason = "only the curves and images of Asylum Research are read, whose channels have names, \
+                and spectra over Hz";
             return Err(Format::Igor.unsupported(content, reason));
         }
     }
@@ -174,7 +180,18 @@ fn wave(bytes: &[u8], budget: &mut Budget) -> Result<Wave, Error> {
     at_most(note_length, MAX_HEADER, "bytes in a note")?;
     let mut at = HEADER.saturating_add(size).saturating_add(formula);
     let note = note(bytes.slice(at, note_length)?);
-    at = at.saturating_add(note_length).saturating_add(data_units);
+    at = at.saturating_add(note_length);
+    // A unit of up to four letters is in the header, a longer one here.
+    let unit = |short: usize, at: usize, length: usize| -> Result<String, Error> {
+        at_most(length, MAX_HEADER, "bytes in a unit")?;
+        let long = until_zero(bytes.slice(at, length)?);
+        let short = until_zero(bytes.slice(short, 4)?);
+        Ok(if long.is_empty() { short } else { long })
+    };
+    let unit_of_data = unit(212, at, data_units)?;
+    at = at.saturating_add(data_units);
+    let first = bytes.f64(180, big_endian)?;
+    let first = (first, unit(216, at, whole(20, 4)?)?);
     for k in 0..4 {
         at = at.saturating_add(whole(20 + 4 * k, 4)?);
     }
@@ -190,6 +207,9 @@ fn wave(bytes: &[u8], budget: &mut Budget) -> Result<Wave, Error> {
     Ok(Wave {
         shape,
         steps,
+        first,
+        name: until_zero(bytes.slice(92, LABEL)?),
+        unit: unit_of_data,
         values,
         note,
         labels,
@@ -273,6 +293,16 @@ fn curve(wave: &Wave) -> Result<Curve, Error> {
     }
     finish(&mut curve, &NAMES);
     Ok(curve)
+}
+
+fn spectrum(wave: &Wave) -> Spectrum {
+    let frequency = |k: usize| wave.first.0 + k as f64 * wave.steps[0];
+    Spectrum {
+        name: wave.name.clone(),
+        unit: wave.unit.clone(),
+        frequency: (0..wave.values.len()).map(frequency).collect(),
+        values: wave.values.clone(),
+    }
 }
 
 fn images(wave: &Wave) -> Vec<Image> {

@@ -32,7 +32,7 @@
 //! | JPK thermal noise | `.tnd` | spectra, settings |
 //! | Bruker Nanoscope | `.spm`, `.000`–`.999`, `.pfc` | curves, force volumes, positions, the grid, images; k, InvOLS |
 //! | Nanosurf | `.nid` | curves and maps, positions, the grid, images, thermal spectra; k, InvOLS |
-//! | Igor, of Asylum Research | `.ibw` | a curve with its segments, or images; k, InvOLS, the note |
+//! | Igor, of Asylum Research | `.ibw` | a curve with its segments, images, or a spectrum; k, InvOLS, the note |
 //! | Asylum Research | `.ardf` | curves and images; written without a real file at hand |
 //! | Gwyddion | `.gwy`, `.gsf` | images, metadata |
 //! | AFM Workshop | `.csv` | a curve with its position; k and InvOLS where they are set |

@@ -192,6 +192,19 @@ fn an_igor_curve_is_cut_at_its_indexes() {
 }
 
 #[test]
+fn an_igor_wave_over_frequency_is_a_spectrum() {
+    let document = open(samples::igor_spectrum());
+    let [spectrum] = &document.spectra[..] else {
+        panic!("{:?}", document.spectra);
+    };
+    assert_eq!(spectrum.name, "ThermalPSD");
+    assert_eq!(spectrum.unit, "V^2/Hz");
+    assert_eq!(spectrum.frequency, [100.0, 100.5, 101.0]);
+    assert_eq!(spectrum.values, [1.0, 2.0, 3.0]);
+    assert_eq!(document.settings[0].1, "25");
+}
+
+#[test]
 fn an_igor_image_has_its_lowest_line_last() {
     let document = open(samples::igor_image());
     assert_eq!(document.images.len(), 2);

@@ -37,6 +37,7 @@ pub mod lyapunov;
 pub mod map;
 pub mod neighbourhood;
 pub mod orbit;
+pub mod random;
 mod reset;
 mod same_motion;
 mod vector;

@@ -1,11 +1,12 @@
 //! Files to save: the case, the time series of the motion, its figures.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
+use nanotap::case::Case;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::model::Model;
@@ -43,6 +44,14 @@ pub(crate) async fn export(
         .run(move |control| exported(&shared, &wish, control))
         .await?;
     Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
+}
+
+/// The case file of what the page shows; empty before the first motion.
+pub(crate) async fn shown(State(app): State<Arc<App>>) -> Result<String, ApiError> {
+    let shown = app.shown.lock().unwrap_or_else(PoisonError::into_inner);
+    let case = shown.as_ref().map(|case| case.any_distance(&app));
+    let case = case.transpose()?;
+    Ok(case.as_ref().map(Case::to_toml).unwrap_or_default())
 }
 
 fn exported(

@@ -17,10 +17,11 @@ use crate::App;
 
 /// The header that carries the token.
 pub(crate) const TOKEN_HEADER: &str = "x-nanotap-token";
-/// Everything is loaded from this server; the page has no inline code or style.
+/// Everything is loaded from this server; the page has no inline code or style. A notebook on this
+/// machine may frame it: that needs the token.
 const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
     img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
-    frame-ancestors 'none'";
+    frame-ancestors http://localhost:* http://127.0.0.1:*";
 
 /// 128 random bits in hexadecimal.
 ///

@@ -40,7 +40,7 @@ mod work;
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -50,7 +50,7 @@ use tokio::net::TcpListener;
 use tokio::sync::Notify;
 
 use crate::figures::Shelf;
-use crate::preset::Preset;
+use crate::preset::{CaseSpec, Preset};
 use crate::scratch::Scratch;
 use crate::work::Workers;
 
@@ -80,6 +80,8 @@ pub(crate) struct App {
     pub(crate) figures: Shelf,
     /// Folder of the datasets of studies while their figures are drawn.
     pub(crate) scratch: PathBuf,
+    /// The case of the most recent motion: what the page shows.
+    pub(crate) shown: Mutex<Option<CaseSpec>>,
 }
 
 /// The address of a running explorer.
@@ -154,6 +156,7 @@ pub fn serve(options: &Options, ready: impl FnOnce(&Address<'_>)) -> Result<(), 
             workers: Workers::default(),
             figures: Shelf::default(),
             scratch: scratch.path().to_owned(),
+            shown: Mutex::default(),
         });
         tokio::select! {
             () = listen::listen(&listener, router(app)) => Ok(()),
@@ -170,6 +173,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/", get(assets::page))
         .route("/{name}", get(assets::part))
         .route("/api/about", get(preset::about))
+        .route("/api/case", get(export::shown))
         .route("/api/motion", post(motion::motion))
         .route("/api/law", post(law::law))
         .route("/api/attractors", post(census::attractors))

@@ -1,6 +1,6 @@
 //! One motion: its figures, its film, its observables, and equivalent commands.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use axum::Json;
 use axum::extract::State;
@@ -145,6 +145,7 @@ fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<V
         request.case.base(app, control)?,
     );
     let model = model_of(&case)?;
+    *app.shown.lock().unwrap_or_else(PoisonError::into_inner) = Some(request.case.clone());
     let mut start = Start::parse(&request.start)?;
     if let Some(from) = &request.from {
         start = followed(&from.case(app, control)?, &case, start)?;

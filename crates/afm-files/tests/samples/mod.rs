@@ -332,6 +332,27 @@ pub(crate) fn igor_curve() -> Vec<u8> {
     igor(&[5, 3], &numbers, &["Raw", "Defl", "ZSnsr"], note)
 }
 
+/// A spectrum of Asylum Research from 100 Hz on in steps of 0.5 Hz, in V²/Hz: a unit of six letters, which
+/// stands behind the note.
+pub(crate) fn igor_spectrum() -> Vec<u8> {
+    let mut file = igor(&[3], &[1.0, 2.0, 3.0], &[], "Temp: 25\r");
+    let unit = b"V^2/Hz";
+    let note = 384 + 12 + "Temp: 25\r".len();
+    file.splice(note..note, unit.iter().copied());
+    let mut put = |at: usize, bytes: &[u8]| file[at..at + bytes.len()].copy_from_slice(bytes);
+    put(16, &(unit.len() as i32).to_le_bytes());
+    put(92, b"ThermalPSD");
+    put(180, &100_f64.to_le_bytes());
+    put(216, b"Hz");
+    put(2, &[0, 0]);
+    let words = file[..384]
+        .chunks_exact(2)
+        .map(|two| u16::from_le_bytes([two[0], two[1]]));
+    let sum = words.fold(0_u16, u16::wrapping_add);
+    file[2..4].copy_from_slice(&sum.wrapping_neg().to_le_bytes());
+    file
+}
+
 /// An image of Asylum Research.
 pub(crate) fn igor_image() -> Vec<u8> {
     let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
@@ -541,6 +562,7 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("nanosurf", nanosurf()),
         ("igor curve", igor_curve()),
         ("igor image", igor_image()),
+        ("igor spectrum", igor_spectrum()),
         ("bruker curve", bruker_curve()),
         ("bruker volume", bruker_volume()),
         ("gwyddion", gwyddion()),

@@ -101,6 +101,20 @@ fn moduli_and_contact_points_of_real_curves_are_those_of_independent_fits() {
     assert!(failures.is_empty(), "{failures}");
 }
 
+#[test]
+fn the_worked_case_of_a_map_is_that_of_its_real_file() {
+    let Some(package) = package("afmformats", "0.18.7") else {
+        println!("skipped: the package afmformats 0.18.7 cannot be downloaded");
+        return;
+    };
+    let folder = Folder::new();
+    let file = "tests/data/fmt-jpk-fd_2020.02.07-16.29.05.036.jpk-qi-data";
+    let copy = folder.path().join("cells.jpk-qi-data");
+    std::fs::copy(package.join(file), copy).unwrap();
+    let done = crate::worked_cases::follow_in(&folder, "qi-map.md");
+    assert_eq!(done, (2, 13));
+}
+
 /// Force curve of a sphere on an elastic half-space, in SI: the lever's base goes down by `travel` from
 /// `start` above the contact point and back; height and deflection are counted from `zero` and `offset`.
 struct Hertz {

@@ -85,8 +85,12 @@ fn commands(text: &str) -> impl Iterator<Item = &str> {
 
 /// Runs one document; returns the numbers of commands and values in it.
 fn follow(name: &str) -> (usize, usize) {
+    follow_in(&with_cases(), name)
+}
+
+/// The same with the files of a folder.
+pub(crate) fn follow_in(folder: &Folder, name: &str) -> (usize, usize) {
     let text = text_of(name);
-    let folder = with_cases();
     let (mut commands, mut numbers) = (0, 0);
     let mut said = Value::Null;
     let mut last = String::new();
@@ -102,7 +106,7 @@ fn follow(name: &str) -> (usize, usize) {
             command.clone_into(&mut last);
             // After the commands before it, whose files it may read.
             for (_, shown) in examples.iter().filter(|(of, _)| *of == command) {
-                crate::front_page::prints(&folder, command, shown);
+                crate::front_page::prints(folder, command, shown);
             }
             commands += 1;
             // Figures that the document mentions are drawn.
@@ -174,6 +178,7 @@ fn every_document_has_a_test() {
             "orbits.md",
             "period-doubling.md",
             "polymer.md",
+            "qi-map.md",
             "reconstruct.md",
             "samples.md",
             "scan.md",

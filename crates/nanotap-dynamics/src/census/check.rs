@@ -16,7 +16,7 @@ use crate::lyapunov::LyapunovSpectrum;
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::orbit::PeriodicOrbit;
-use crate::vector::{mix, unit};
+use crate::random::{mix, unit};
 
 /// A start of a census that was followed again on the map itself.
 #[derive(Clone, Debug, PartialEq)]

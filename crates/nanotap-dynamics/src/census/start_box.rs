@@ -9,7 +9,7 @@
 //! evenly than random points, until there are as many points as the largest prime.
 
 use crate::control::Control;
-use crate::vector::mix;
+use crate::random::mix;
 
 /// A box of initial states, from a lower to an upper corner, or the part of it in front of a wall.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@
 //! The k-th start depends on the set and k alone.
 
 use crate::census::start_box::{StartBox, StartBoxError};
-use crate::vector::mix;
+use crate::random::mix;
 
 /// A set of starts, given or drawn without end; it has at least one start.
 #[derive(Clone, Debug, PartialEq)]

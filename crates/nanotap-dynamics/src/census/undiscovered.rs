@@ -60,7 +60,7 @@ fn log_error(motions: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::unit;
+    use crate::random::unit;
 
     #[test]
     fn the_bound_falls_like_one_over_the_starts() {

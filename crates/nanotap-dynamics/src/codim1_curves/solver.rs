@@ -8,7 +8,8 @@ use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies,
 use crate::map::{StroboscopicMap, TwoParameterFamily};
 use crate::orbit::Multipliers;
 use crate::orbit::shooting::{MAX_DISCRETE_UPDATES, Segments, set_discrete_entries};
-use crate::vector::{distance, norm, unit};
+use crate::random::unit;
+use crate::vector::{distance, norm};
 
 /// Largest orbit without a size, as a fraction of the state scale of its branch.
 const MIN_ORBIT_SIZE: f64 = 1e-6;

@@ -17,7 +17,8 @@ use crate::continuation::{Branch, ContinuationError, ContinuationOptions};
 use crate::control::Control;
 use crate::map::MapFamily;
 use crate::orbit::block_cyclic::BlockCyclic;
-use crate::vector::{dot, norm, unit};
+use crate::random::unit;
+use crate::vector::{dot, norm};
 
 /// Follows the doubled branch from a flip.
 ///

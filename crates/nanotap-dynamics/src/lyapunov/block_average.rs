@@ -105,7 +105,7 @@ impl BlockAverage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::unit;
+    use crate::random::unit;
 
     /// Uniform noise: mean 1/2, standard error √(1/12n).
     #[test]

@@ -22,7 +22,7 @@ pub(crate) use adapted_norm::AdaptedNorm;
 use crate::failure::{MapFailure, advance_by, advance_with_jacobian};
 use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
-use crate::vector::unit;
+use crate::random::unit;
 
 /// Ratio of successive trial radii, and of the radius used to the radius that passes.
 const SHRINK: f64 = 0.75;

@@ -198,7 +198,7 @@ fn triangularise(panel: &mut [f64], d: usize, reflector: &mut [f64], factors: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::unit;
+    use crate::random::unit;
 
     fn random(seed: &mut u64) -> f64 {
         *seed += 1;

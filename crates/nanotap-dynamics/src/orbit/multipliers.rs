@@ -14,7 +14,7 @@ use nalgebra::{Complex, DMatrix, DVector, Schur};
 use nanotap_arithmetic::ComplexFunctions as _;
 
 use crate::map::StroboscopicMap;
-use crate::vector::unit;
+use crate::random::unit;
 
 /// A multiplier whose modulus is within this of 1 counts as marginal where bifurcations are looked
 /// for. A double multiplier on the unit circle (an undamped system) is known to about this accuracy;
@@ -478,7 +478,7 @@ mod tests {
         let (n, diagonal) = (20, [4.0, 1.5, -0.1, 0.003]);
         let frame = |k: usize| {
             DMatrix::from_fn(4, 4, |i, j| {
-                let chance = crate::vector::unit((16 * k + 4 * i + j) as u64) - 0.5;
+                let chance = crate::random::unit((16 * k + 4 * i + j) as u64) - 0.5;
                 chance + if i == j { 2.0 } else { 0.0 }
             })
         };

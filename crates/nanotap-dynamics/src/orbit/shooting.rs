@@ -23,7 +23,8 @@ use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
 use crate::orbit::multipliers::{MultiplierError, Multipliers};
 use crate::orbit::parallel::for_each_period;
-use crate::vector::{distance, mix, norm, sum_of_squares};
+use crate::random::mix;
+use crate::vector::{distance, norm, sum_of_squares};
 
 /// Options of Newton's method for periodic orbits.
 #[derive(Clone, Debug, PartialEq)]

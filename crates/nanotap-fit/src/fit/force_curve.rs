@@ -83,7 +83,7 @@ pub(super) fn free_by_default(
     }
     let all: Vec<&str> = free.iter().chain(&*per_curve).map(String::as_str).collect();
     Ok(format!(
-        "free, because the option `free` names nothing: {}",
+        "free, because the option `free` names nothing of the sample: {}",
         all.join(", ")
     ))
 }

@@ -108,8 +108,8 @@ options! {
         pub data: Vec<Table> = Vec::new(),
         /// Parameters to find: keys of the case, gap.offset, NAME.offset or NAME.scale of a column, and
         /// terms of the instrument: NAME.tilt, NAME.curvature, NAME.interference, NAME.drag, gap.drift,
-        /// gap.backlash; default for a force curve: modulus, contact point, baseline, and the adhesion of
-        /// the law
+        /// gap.backlash; of a force curve without other names than these terms, too: modulus, contact point,
+        /// baseline, and the adhesion of the law
         #[schemars(extend("x-value" = "KEY,…"))]
         pub free: Vec<String> = Vec::new(),
         /// Parameters to find with one value per curve
@@ -399,7 +399,7 @@ fn with_search<R>(
             .find(|curve| curve.name == channels.table);
         channels.rows = own.map_or(channels.rows, |curve| curve.rows.len());
     }
-    if data.is_force_curve() && free.is_empty() && per_curve.is_empty() {
+    if data.is_force_curve() && free.iter().chain(&per_curve).all(|name| terms::is_term(name)) {
         let note = force_curve::free_by_default(&case, &data, &mut free, &mut per_curve)?;
         preparation.push(note);
     }

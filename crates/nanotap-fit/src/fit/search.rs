@@ -14,6 +14,7 @@ use super::report::FitReport;
 use super::solve::{Solution, minimise};
 use super::statistics::{exceeding, persistence, range};
 use nanotap_dynamics::control::Control;
+use nanotap_dynamics::random::Random;
 use nanotap_error::Error;
 
 /// Problem and options of a search for the best values.
@@ -135,15 +136,7 @@ impl<'a> Search<'a> {
     /// a scan, if it finds better ones than the case's, and those of the case; then others within the bounds
     /// or a factor of four, with the best offset of the distance.
     fn starts(&self) -> impl Iterator<Item = Vec<f64>> {
-        let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
-        // SplitMix64 (Steele, Lea, Flood 2014).
-        let mut random = move || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = state;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = Random::new(self.request.seed ^ 0x9e37_79b9_7f4a_7c15);
         let parameters = self.problem.parameters;
         let near = &self.request.near;
         let value_near = |p: &Parameter| near.iter().find(|(name, _)| *name == p.name);
@@ -158,7 +151,7 @@ impl<'a> Search<'a> {
         });
         let further = std::iter::repeat_with(move || {
             let start = parameters.iter().map(|p| {
-                let u = random();
+                let u = random.uniform();
                 let (mut low, mut high) = if p.start > 0.0 && p.bounds.0 >= 0.0 {
                     (0.25 * p.start, 4.0 * p.start)
                 } else {

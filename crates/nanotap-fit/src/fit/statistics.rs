@@ -1,6 +1,7 @@
 //! Standard errors, correlations and tests from the residuals of a fit.
 
 use nalgebra::{DMatrix, SymmetricEigen};
+use nanotap_dynamics::random::Random;
 
 /// A direction in which the parameters can go without a change that the data would show.
 pub(super) struct Direction {
@@ -303,7 +304,7 @@ impl Sequences<'_> {
         let count = residuals.len();
         let draws = DRAWS.min(MAX_DEVIATES / count.max(1)).max(200);
         let most = level * (draws + 1) as f64;
-        let mut deviates = Deviates(0x5eed);
+        let mut deviates = Random::new(0x5eed);
         let mut exceeding = 1;
         for _ in 0..draws {
             let noise = nalgebra::DVector::from_fn(count, |_, _| deviates.normal());
@@ -314,24 +315,6 @@ impl Sequences<'_> {
             }
         }
         true
-    }
-}
-
-/// Normal deviates: SplitMix64 (Steele, Lea, Flood 2014), and Box and Muller.
-struct Deviates(u64);
-
-impl Deviates {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * nanotap_arithmetic::ln(self.uniform())).sqrt();
-        radius * nanotap_arithmetic::cos(std::f64::consts::TAU * self.uniform())
     }
 }
 
@@ -376,7 +359,7 @@ mod tests {
             columns: &columns,
             basis: &basis,
         };
-        let mut deviates = Deviates(7);
+        let mut deviates = Random::new(7);
         let mut few = 0;
         for _ in 0..100 {
             let noise = nalgebra::DVector::from_fn(60, |_, _| deviates.normal());

@@ -166,6 +166,12 @@ impl Term {
     }
 }
 
+/// Whether a name is that of a term, as in `deflection.tilt`, or of a sensitivity, as in `deflection.scale`.
+pub(super) fn is_term(name: &str) -> bool {
+    let (_, term) = name.rsplit_once('.').unwrap_or_default();
+    term == "scale" || Term::named(term).is_some()
+}
+
 /// The names with the short ones and `X.interference` written out.
 ///
 /// # Errors

@@ -1,6 +1,8 @@
 //! Criteria of compared laws.
 
-use super::{Noise, case, fitted, options, table, tapping};
+use nanotap_dynamics::random::Random;
+
+use super::{case, fitted, options, table, tapping};
 use nanotap_fit::fit::FitOptions;
 use nanotap_motions::approach::Way;
 
@@ -18,7 +20,7 @@ fn rows_without_an_orbit_do_not_decide_between_laws() {
         .into_iter()
         .filter(|row| row.3 == Way::Approach)
         .collect();
-    let mut noise = Noise(31);
+    let mut noise = Random::new(31);
     let mut amplitude: Vec<f64> = rows
         .iter()
         .map(|row| row.1 + 0.01 * noise.normal())

@@ -11,25 +11,6 @@ use nanotap_dynamics::Control;
 use nanotap_fit::fit::{FitOptions, FitReport, FittedParameter, Segment, fit};
 use nanotap_motions::approach::{ApproachOptions, Way, approach};
 
-/// Normal deviates (SplitMix64; Box and Muller).
-struct Noise(u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let (u, v) = (self.uniform(), self.uniform());
-        (-2.0 * nanotap_arithmetic::ln(u)).sqrt()
-            * nanotap_arithmetic::cos(std::f64::consts::TAU * v)
-    }
-}
-
 fn case(text: &str, overrides: &[&str]) -> Case {
     let source = Source {
         name: "lever.toml".into(),

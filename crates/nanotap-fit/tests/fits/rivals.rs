@@ -1,6 +1,8 @@
 //! Other minima that describe the data, and what decides.
 
-use super::{Noise, case, fitted, options, parameter, table, tapping};
+use nanotap_dynamics::random::Random;
+
+use super::{case, fitted, options, parameter, table, tapping};
 use nanotap_case::table::Table;
 use nanotap_fit::fit::{FitOptions, FitReport};
 use nanotap_motions::approach::Way;
@@ -14,7 +16,7 @@ const LEVER: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"0.8736193621040327 
 /// 18 rows each way on the attractive branch, with noise of 0.03 nm and, with a phase, 0.1°.
 fn record(with_phase: bool) -> Table {
     let rows = tapping(&case(LEVER, &[]), 24.0, 13.0, 18);
-    let mut noise = Noise(5);
+    let mut noise = Random::new(5);
     let amplitude: Vec<f64> = rows
         .iter()
         .map(|row| row.1 + 0.03 * noise.normal())

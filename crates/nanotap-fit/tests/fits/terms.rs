@@ -1,6 +1,8 @@
 //! Terms of the instrument in force curves and in tapping curves.
 
-use super::{Noise, case, fitted, off, options, parameter, table, tapping};
+use nanotap_dynamics::random::Random;
+
+use super::{case, fitted, off, options, parameter, table, tapping};
 use nanotap_case::Case;
 use nanotap_case::table::Table;
 use nanotap_dynamics::Control;
@@ -125,7 +127,7 @@ fn recorded(example: Option<&Example>, seed: u64) -> Table {
         }
     }
     let far = distance.iter().copied().fold(0.0, f64::max);
-    let mut noise = Noise(seed);
+    let mut noise = Random::new(seed);
     let deflection = (0..rows.len()).map(|k| {
         let depth = 1e-9 * (distance[k] - far);
         let value = rows[k][1];
@@ -258,7 +260,7 @@ fn a_tilt_of_a_tapping_curve_is_found() {
         .collect();
     let ways: Vec<Way> = rows.iter().map(|row| row.3).collect();
     let record = |tilt: f64, seed: u64| {
-        let mut noise = Noise(seed);
+        let mut noise = Random::new(seed);
         let amplitude = rows
             .iter()
             .map(|row| row.1 + tilt * (row.0 - 40.0) + 0.03 * noise.normal());

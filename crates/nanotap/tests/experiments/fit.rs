@@ -10,6 +10,7 @@ use nanotap::study::fit::{
     Data, Entry, FitOptions, FitReport, FittedParameter, Table, fit, residuals,
 };
 use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap_dynamics::random::Random;
 use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
 /// A stiff lever a little above its resonance: two motions at one distance.
@@ -24,24 +25,6 @@ fn case(text: &str, overrides: &[&str]) -> Case {
     };
     let words: Vec<String> = overrides.iter().map(|word| (*word).to_owned()).collect();
     Case::parse(Some(source), &words).unwrap()
-}
-
-/// Normal deviates (SplitMix64, Box and Muller).
-pub(crate) struct Noise(pub(crate) u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn normal(&mut self) -> f64 {
-        let (u, v) = (self.uniform(), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-    }
 }
 
 /// Distance (nm), amplitude (nm), phase (deg) and direction of an approach curve, without noise.
@@ -65,7 +48,7 @@ pub(crate) fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64,
 /// The same as a table, with noise of these sizes, which the table states if `stated`.
 pub(crate) fn measured(
     curve: &[(f64, f64, f64, Way)],
-    noise: &mut Noise,
+    noise: &mut Random,
     [of_amplitude, of_phase]: [f64; 2],
     stated: bool,
 ) -> Table {
@@ -121,10 +104,10 @@ fn covered(
     repetitions: u64,
     start: &Case,
     jumps: bool,
-    table: impl Fn(&mut Noise) -> Table + Sync,
+    table: impl Fn(&mut Random) -> Table + Sync,
 ) -> [usize; 3] {
     let one = |repetition: u64| {
-        let table = table(&mut Noise(1000 + repetition));
+        let table = table(&mut Random(1000 + repetition));
         let asked = FitOptions {
             jumps,
             ..request(vec![table], &FREE)
@@ -157,7 +140,7 @@ fn covered_tapping(repetitions: u64, stated: bool) -> [usize; 3] {
 
 /// Rows on both branches, approach and retract, 0.8 nm apart, from a random offset: the jumps are
 /// not in the middle between two rows.
-fn both_branches(dense: &[(f64, f64, f64, Way)], noise: &mut Noise) -> Table {
+fn both_branches(dense: &[(f64, f64, f64, Way)], noise: &mut Random) -> Table {
     const APART: usize = 40;
     let mut rows = Vec::new();
     for way in [Way::Approach, Way::Retract] {
@@ -188,7 +171,7 @@ fn covered_with_jumps(repetitions: u64, jumps: bool) -> [usize; 3] {
 #[test]
 fn a_fit_continues_from_a_lower_chi2_of_its_profile() {
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
-    let table = both_branches(&densely(), &mut Noise(1015));
+    let table = both_branches(&densely(), &mut Random::new(1015));
     let report = fitted(&start, &request(vec![table], &FREE));
     assert_eq!(report.jumps.len(), 2);
     assert!(report.chi2 < 67.08, "{}", report.chi2);
@@ -234,7 +217,7 @@ fn intervals_contain_the_true_values_in_95_of_100_repetitions() {
 fn rows_are_assigned_to_the_branch_of_the_data() {
     let truth = case(LEVER, &[]);
     let curve = curve(&truth, 25.0, 10.0, 31);
-    let table = measured(&curve, &mut Noise(7), [0.05, 0.2], true);
+    let table = measured(&curve, &mut Random::new(7), [0.05, 0.2], true);
     // Initial parameters for which the tapping branch ends elsewhere.
     let start = case(
         LEVER,
@@ -276,7 +259,7 @@ fn a_row_at_the_end_of_its_branch_does_not_bias_the_fit() {
     let curve = curve(&truth, 24.75, 12.03, 25);
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
     for seed in 100..106 {
-        let table = measured(&curve, &mut Noise(seed), [0.1, 0.5], true);
+        let table = measured(&curve, &mut Random::new(seed), [0.1, 0.5], true);
         let report = fitted(&start, &request(vec![table], &FREE));
         assert!(report.fits, "{seed}: {:?}", report.reason);
         assert_eq!(report.jumps.len(), 2, "{seed}");
@@ -294,7 +277,7 @@ fn a_row_at_the_end_of_its_branch_does_not_bias_the_fit() {
 fn the_location_of_a_jump_is_a_datum() {
     let truth = case(LEVER, &[]);
     let curve = curve(&truth, 25.0, 12.0, 53);
-    let table = measured(&curve, &mut Noise(17), [0.1, 0.5], true);
+    let table = measured(&curve, &mut Random::new(17), [0.1, 0.5], true);
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
     let with = request(vec![table], &FREE);
     let without = FitOptions {
@@ -333,7 +316,7 @@ fn a_free_amplitude_is_fitted_to_resonance_curves() {
     let truth = case(LEVER, &["drive.free_amplitude=22 nm", "cantilever.Q=380"]);
     let rows = [0.990, 0.993, 0.995, 0.996, 0.9965];
     let frequencies: Vec<f64> = rows.iter().map(|ratio| ratio * 330e3).collect();
-    let mut noise = Noise(41);
+    let mut noise = Random::new(41);
     let (mut amplitude, mut phase) = (Vec::new(), Vec::new());
     for frequency in &frequencies {
         let key = truth.key("drive.frequency").unwrap();
@@ -389,7 +372,7 @@ fn a_resonance_curve_is_fitted_with_both_branches() {
     ]
     .map(|name| (name.to_owned(), Vec::new()))
     .to_vec();
-    let mut noise = Noise(61);
+    let mut noise = Random::new(61);
     let mut state = vec![0.0; truth.model().unwrap().dimension()];
     let down = frequencies.iter().rev().map(|f| (*f, "down"));
     for (frequency, direction) in frequencies.iter().map(|f| (*f, "up")).chain(down) {
@@ -462,7 +445,7 @@ fn data_on_one_branch_are_not_assigned_to_the_other() {
     let truth = case(LEVER, &[]);
     let mut curve = curve(&truth, 22.5, 10.0, 26);
     curve.retain(|row| row.3 == Way::Retract);
-    let table = measured(&curve, &mut Noise(8), [0.05, 0.2], true);
+    let table = measured(&curve, &mut Random::new(8), [0.05, 0.2], true);
     let report = fitted(&truth, &request(vec![table], &FREE));
     assert!(report.fits, "{:?}", report.reason);
     assert!(
@@ -476,7 +459,7 @@ fn data_on_one_branch_are_not_assigned_to_the_other() {
         .iter()
         .map(|row| (row.0, 20.0, 128.8, row.3))
         .collect();
-    let table = measured(&free, &mut Noise(9), [0.05, 0.2], true);
+    let table = measured(&free, &mut Random::new(9), [0.05, 0.2], true);
     let refused = fitted(&truth, &request(vec![table], &FREE));
     assert!(!refused.fits && refused.reason.is_some());
 }
@@ -487,7 +470,7 @@ fn a_branch_that_the_curve_does_not_reach_is_found_from_the_data() {
     let truth = case(LEVER, &[]);
     let mut curve = curve(&truth, 22.5, 10.0, 51);
     curve.retain(|row| row.3 == Way::Retract && row.0 > 20.5);
-    let table = measured(&curve, &mut Noise(13), [0.02, 0.1], true);
+    let table = measured(&curve, &mut Random::new(13), [0.02, 0.1], true);
     let start = case(LEVER, &["sample.stiffness=25 N/m"]);
     let free = ["sample.stiffness", "gap.offset"];
     let report = fitted(&start, &request(vec![table], &free));
@@ -562,7 +545,7 @@ fn sidebands_are_columns() {
     ];
     let mut columns = vec![("distance (nm)".to_owned(), Vec::new())];
     columns.extend(names.map(|name| (name.to_owned(), Vec::new())));
-    let mut noise = Noise(5);
+    let mut noise = Random::new(5);
     for k in 0..6 {
         let distance = 8.0 + 1.5 * f64::from(k);
         let at = case(&text, &[&format!("gap.tip={distance} nm")]);
@@ -621,7 +604,7 @@ fn undetermined_combinations_are_named() {
     let text = text.replace("[sample]", "[tip]\nradius = \"10 nm\"\n[sample]");
     let truth = case(&text, &[]);
     let curve = curve(&truth, 18.0, 4.0, 15);
-    let table = measured(&curve, &mut Noise(3), [0.05, 0.2], true);
+    let table = measured(&curve, &mut Random::new(3), [0.05, 0.2], true);
     let free = [
         "sample.modulus",
         "sample.indentation",
@@ -677,7 +660,7 @@ fn derivatives_are_right(
 fn derivatives_of_residuals_are_exact() {
     let truth = case(LEVER, &[]);
     let curve = curve(&truth, 19.0, 2.0, 8);
-    let table = measured(&curve, &mut Noise(5), [0.05, 0.2], false);
+    let table = measured(&curve, &mut Random::new(5), [0.05, 0.2], false);
     let free = [
         "sample.stiffness",
         "sample.loss_tangent",
@@ -703,7 +686,7 @@ fn a_nonlinear_law_is_fitted() {
     let truth = case(text, &[]);
     let mut curve = curve(&truth, 18.0, 8.0, 9);
     curve.retain(|row| row.3 == Way::Approach);
-    let table = measured(&curve, &mut Noise(11), [0.02, 0.1], true);
+    let table = measured(&curve, &mut Random::new(11), [0.02, 0.1], true);
     let free = ["sample.modulus", "gap.offset"];
     let start = case(text, &["sample.modulus=3 GPa"]);
     let request = request(vec![table], &free);
@@ -729,7 +712,7 @@ fn another_law_is_recognised() {
     let truth = case(text, &[]);
     let mut curve = curve(&truth, 18.0, 2.0, 25);
     curve.retain(|row| row.3 == Way::Approach);
-    let table = measured(&curve, &mut Noise(12), [0.01, 0.05], true);
+    let table = measured(&curve, &mut Random::new(12), [0.01, 0.05], true);
     let linear = text.replace(
         "law = \"hertz\"\nmodulus = \"0.5 GPa\"\npoisson = 0.3",
         "stiffness = \"10 N/m\"",
@@ -753,7 +736,7 @@ fn curves_share_a_sample_with_separate_distances() {
     for row in &mut far {
         row.0 += 0.3;
     }
-    let mut noise = Noise(21);
+    let mut noise = Random::new(21);
     let tables = [near, far].into_iter().enumerate().map(|(k, curve)| {
         let mut table = measured(&curve, &mut noise, [0.05, 0.2], true);
         table.name = format!("curve {k}");
@@ -1017,7 +1000,7 @@ fn the_law_of_the_data_is_chosen_among_several() {
     let truth = case(PULLING, &[]);
     let mut curve = curve(&truth, 18.0, 6.0, 13);
     curve.retain(|row| row.3 == Way::Approach);
-    let table = measured(&curve, &mut Noise(31), [0.01, 0.05], true);
+    let table = measured(&curve, &mut Random::new(31), [0.01, 0.05], true);
     // Starting from the law without attraction: parameters of the other laws start between their
     // bounds.
     let start = case(
@@ -1194,8 +1177,8 @@ fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) ->
     let names = names.chain(["relative_shift", "drive_ratio", "drive_dissipation (J)"]);
     let mut columns: Vec<(String, Vec<Entry>)> =
         names.map(|name| (name.to_owned(), Vec::new())).collect();
-    let mut noise = noise.map(Noise);
-    let mut normal = || noise.as_mut().map_or(0.0, Noise::normal);
+    let mut noise = noise.map(Random::new);
+    let mut normal = || noise.as_mut().map_or(0.0, Random::normal);
     for point in report.table.iter().filter(|p| p.way == Way::Approach) {
         let (of, si) = (point.modulation.unwrap(), point.modulation_si.unwrap());
         let row = [
@@ -1358,7 +1341,7 @@ const ATTRACTING: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 =
 /// the knee the phase bends too much to be interpolated.
 fn attracting(text: &str, points: usize, noise: u64) -> Vec<(f64, f64, f64)> {
     let rows = curve(&case(text, &[]), 22.0, 8.0, points);
-    let mut noise = Noise(noise);
+    let mut noise = Random::new(noise);
     let mut noisy = |row: &(f64, f64, f64, Way)| {
         let amplitude = row.1 + 0.03 * noise.normal();
         (row.0, amplitude, row.2 + 0.15 * noise.normal())
@@ -1686,7 +1669,7 @@ fn a_curve_in_the_wrong_order_is_turned() {
         .into_iter()
         .filter(|row| row.3 == Way::Approach)
         .collect();
-    let mut sorted = measured(&approach, &mut Noise(3), [0.02, 0.1], false);
+    let mut sorted = measured(&approach, &mut Random::new(3), [0.02, 0.1], false);
     for (_, column) in &mut sorted.columns {
         column.reverse();
     }

@@ -8,7 +8,7 @@ use nanotap::study::Study as _;
 use nanotap::study::fit::{Entry, FitOptions, FitReport, Table, fit};
 use nanotap::study::force_curve::{ForceCurveOptions, ForceCurveReport, ForceCurveStudy};
 
-use super::fit::Noise;
+use nanotap_dynamics::random::Random;
 
 /// A soft lever that rings down within a tenth of a nanometre of the ramp.
 fn case(law: &str, values: &[&str]) -> Case {
@@ -49,7 +49,7 @@ const OMITTED: f64 = 1.4437e-3 / 0.5;
 /// As an instrument records it: the piezo in another zero and direction, a baseline, noise; columns
 /// of other names.
 fn recorded(curve: &ForceCurveReport, noise: f64, seed: u64) -> Table {
-    let mut noise_of = Noise(seed);
+    let mut noise_of = Random::new(seed);
     let number = |of: f64| Entry::Number(of * 1e9);
     let piezo = curve.points.iter();
     let piezo = piezo.map(|p| number(-p.distance + OMITTED * p.force + 700e-9));

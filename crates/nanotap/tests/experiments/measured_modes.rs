@@ -127,8 +127,9 @@ proptest! {
         let distinct = found.windows(2).all(|pair| pair[1][0] > 1.01 * pair[0][0]);
         prop_assume!(distinct);
         let own = |f: f64, k: f64| if has_stiffness { k } else { near(f)[1] };
-        // The terms of rank one cancel entries that a heavy tip makes tens of times as large.
-        let tolerance = 1e-11;
+        // The terms of rank one cancel entries that a heavy tip makes tens of times as large, and the eigenvalues
+        // of this test have the error of the largest one.
+        let tolerance = 1e-9;
         assert_met(&near(first), &[first, stiffness, quality[0]], tolerance, "first");
         assert_met(&near(f2), &[f2, own(f2, k2), quality[1]], tolerance, "second");
         assert_met(&near(f3), &[f3, own(f3, k3), quality[2]], tolerance, "third");

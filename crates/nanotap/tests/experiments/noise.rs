@@ -10,6 +10,7 @@ use nanotap::study::Study as _;
 use nanotap::study::attractors::{AttractorsOptions, AttractorsStudy};
 use nanotap::study::noise::{BOLTZMANN, NoiseOptions, NoiseReport, NoiseStudy};
 use nanotap::study::setpoint::at_setpoint;
+use nanotap_dynamics::random::Random;
 use nanotap_flow::Flow;
 
 /// A lever of 2 N/m at 70 kHz, driven by a force at its tip, with further words.
@@ -296,7 +297,7 @@ fn a_stochastic_simulation_agrees_within_its_error_bars() {
     let tau = time_constant / scales.time;
     let energy = BOLTZMANN * 295.0 / scales.energy;
     let kick = (2.0 * energy * equations.damping[0][(0, 0)] * h).sqrt() / equations.mass[(0, 0)];
-    let mut random = Gaussian(7);
+    let mut random = Random::new(7);
     let mut flow = Flow::new(model.system.clone());
     let mut state =
         nanotap::study::orbit::orbit(&model, &nanotap::study::orbit::OrbitOptions::default())
@@ -315,7 +316,7 @@ fn a_stochastic_simulation_agrees_within_its_error_bars() {
                 flow.run_period(&mut ()).unwrap();
             }
             flow.state(&mut state);
-            state[1] += kick * random.next();
+            state[1] += kick * random.normal();
             let (sin, cos) = (omega * (k + 1) as f64 * h).sin_cos();
             let signal = 2.0 * h / tau * tip * state[0];
             re = re * fade + signal * cos;
@@ -344,24 +345,6 @@ fn a_stochastic_simulation_agrees_within_its_error_bars() {
             off.abs() < 4.0,
             "{found} {expected}: {off} standard errors of {error}"
         );
-    }
-}
-
-/// Normal deviates from a small generator, Box and Muller's way.
-struct Gaussian(u64);
-
-impl Gaussian {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-    }
-
-    fn next(&mut self) -> f64 {
-        let (u, v) = (self.uniform(), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
     }
 }
 

@@ -11,7 +11,8 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::reconstruct::{ReconstructOptions, ReconstructReport, reconstruct};
 use serde_json::Value;
 
-use crate::fit::{Noise, curve, measured};
+use crate::fit::{curve, measured};
+use nanotap_dynamics::random::Random;
 
 /// Curves that another program made, with the laws' own forces.
 fn references() -> Vec<Value> {
@@ -48,7 +49,7 @@ fn lever(reference: &Value) -> Case {
 /// Every `step`th row of a reference, with noise in nm and degrees.
 fn rows(reference: &Value, step: usize, noise: [f64; 2], seed: u64) -> Table {
     let rows = &reference["rows"];
-    let mut random = Noise(seed);
+    let mut random = Random::new(seed);
     let mut column = |name: &str, factor: f64, noise: f64| -> Vec<Entry> {
         let values = numbers(&rows[name]).into_iter();
         let noisy = values.map(|value| factor * value + noise * random.normal());
@@ -404,7 +405,7 @@ fn standard_errors_hold_and_no_force_is_beyond_the_closest_approach() {
         let rows = curve(&case, 16.0, 3.0, 100);
         let (mut held, mut all) = (0, 0);
         for seed in 1..=5 {
-            let data = measured(&rows, &mut Noise(seed), LOW_NOISE, false);
+            let data = measured(&rows, &mut Random::new(seed), LOW_NOISE, false);
             let report = reconstructed(&case, data, ReconstructOptions::default());
             let found = &report.table;
             assert!(found.distance[0] >= report.closest);
@@ -434,7 +435,7 @@ fn a_curve_that_begins_in_contact_does_not_determine_the_force() {
     let case = stiff_lever(DMT);
     let rows = curve(&case, 12.8, 3.0, 100);
     let options = ReconstructOptions {
-        data: vec![measured(&rows, &mut Noise(1), LOW_NOISE, false)],
+        data: vec![measured(&rows, &mut Random::new(1), LOW_NOISE, false)],
         free_amplitude: Some("12 nm".into()),
         free_phase: Some(51.47),
         ..ReconstructOptions::default()
@@ -450,7 +451,7 @@ fn noise_over_a_stiff_sample_gives_no_large_force() {
     let rows = curve(&case, 14.0, 4.0, 100);
     for seed in [1, 2, 48, 84] {
         let options = ReconstructOptions {
-            data: vec![measured(&rows, &mut Noise(seed), [0.05, 0.25], false)],
+            data: vec![measured(&rows, &mut Random::new(seed), [0.05, 0.25], false)],
             ..ReconstructOptions::default()
         };
         match reconstruct(&case, &options, &Control::default()) {
@@ -470,7 +471,7 @@ fn a_sample_that_moves_between_approach_and_retract_is_reported() {
     for row in rows.iter_mut().filter(|row| row.3 == Way::Retract) {
         row.0 += 0.15;
     }
-    let data = measured(&rows, &mut Noise(1), LOW_NOISE, false);
+    let data = measured(&rows, &mut Random::new(1), LOW_NOISE, false);
     let report = reconstructed(&case, data, ReconstructOptions::default());
     assert_eq!(report.ways.len(), 2, "{:?}", report.remarks);
 }

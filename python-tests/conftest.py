@@ -1,6 +1,9 @@
 """Fixtures of all tests. Run by `cargo xtask test-python` on the installed wheel."""
 
+from pathlib import Path
+
 import nanotap
+import numpy as np
 import pytest
 
 
@@ -29,3 +32,34 @@ PHYSICAL = {
 def physical():
     """An FM-class lever on polystyrene: α₄ of about 25, Ω = 2.6."""
     return nanotap.Case(**PHYSICAL)
+
+
+@pytest.fixture(scope="session")
+def cell_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
+    """A map of 2 × 2 force curves in HDF5 of afmformats, of which one is missing, and the moduli (Pa) by row
+    and column: a bead of 5 µm on a lever of 0.05 N/m, noise of 5 pN.
+    """
+    h5py = pytest.importorskip("h5py")
+    radius, k, rng = 5e-6, 0.05, np.random.default_rng(1)
+    moduli = np.array([[1e3, 2e3], [4e3, np.nan]])
+    height = np.linspace(1.5e-6, -1.5e-6, 400)
+    path = tmp_path_factory.mktemp("map") / "cells.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["software"] = "afmformats"
+        for number, (y, x) in enumerate(np.argwhere(np.isfinite(moduli))):
+            # Hertz in closed form: the force over the indentation, and the height of the base.
+            indentation = np.linspace(0, 3e-6, 20000)
+            force = 4 / 3 * moduli[y, x] / 0.75 * np.sqrt(radius) * indentation**1.5
+            way = np.interp(-height, indentation + force / k, force, left=0)
+            forces = np.concatenate([way, way[::-1]]) + rng.normal(0, 5e-12, 800)
+            group = file.create_group(str(number))
+            group.attrs.update({"spring constant": k, "imaging mode": "force-distance"})
+            for name, of in (("x", x), ("y", y)):
+                group.attrs.update({f"grid shape {name}": 2, f"grid size {name}": 4e-6})
+                group.attrs.update(
+                    {f"grid center {name}": 0.0, f"grid index {name}": int(of)}
+                )
+            group["force"] = forces
+            group["height (measured)"] = np.concatenate([height, height[::-1]])
+            group["segment"] = np.repeat([0, 1], 400)
+    return path, moduli

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import http.client
 import json
@@ -24,6 +25,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 
@@ -1842,15 +1844,40 @@ def test_a_measured_curve_is_shown_over_the_model_and_fitted(
     assert "[sample]" in Path(saved.value.path()).read_text()
 
 
+def test_a_map_of_an_instrument_is_fitted(
+    address: str, cell_map: tuple[Path, np.ndarray]
+) -> None:
+    path, moduli = cell_map
+    form = motion(address, "stiff-lever")["forms"]["data"]
+    options = {field["name"]: field["value"] for field in form}
+    options |= {"tip_radius": "5 um", "poisson": "0.5", "spring_constant": "0.05 N/m"}
+    case = {
+        "preset": "stiff-lever",
+        "set": {"sample.modulus": "10 kPa", "sample.law": "hertz"},
+    }
+    content = {"base64": base64.b64encode(path.read_bytes()).decode()}
+    wanted = {"case": case, "tab": "data", "data": [path.name, content]}
+    for curve, modulus in (("1", moduli[0, 1]), ("all", np.nanmedian(moduli))):
+        answer = studied(
+            address, **wanted, options=options | {"curve": curve, "fit": "yes"}
+        )[-1]
+        shown = json.dumps(answer["tables"], ensure_ascii=False)
+        kilopascals = re.search(r'"([\d.]+) kPa', shown)
+        assert kilopascals, shown
+        assert float(kilopascals[1]) == pytest.approx(modulus / 1e3, rel=0.03)
+    refused = studied(address, **wanted, options=options | {"curve": "7"})[-1]
+    assert "7" in refused["error"], refused
+
+
 def test_measured_data_are_bounded_and_refused_in_words(address: str) -> None:
     form = motion(address, "stiff-lever")["forms"]["data"]
     options = {field["name"]: field["value"] for field in form}
     wanted = {"case": {"preset": "stiff-lever"}, "tab": "data", "options": options}
-    for text, words in (("p,q\n1", "fields"), ("p,q\n1,2\n", "observable")):
+    for text, words in (("p,q\n1\n", "fields"), ("p,q\n1,2\n", "observable")):
         answer = studied(address, **wanted, data=["x.csv", text])[-1]
         assert words in answer["error"], answer
     with pytest.raises(urllib.error.HTTPError) as refused:
-        asked(address, "/api/study", wanted | {"data": ["x.csv", "1" * 2_200_000]})
+        asked(address, "/api/study", wanted | {"data": ["x.csv", "1" * 36_000_000]})
     assert refused.value.code == 413
 
 

@@ -106,29 +106,10 @@ def test_a_force_volume_is_a_dataset(
         nanotap.fit(soft, data=volume, free=FREE, pixels=["x", "y"])
 
 
-def test_a_map_in_an_instruments_file_is_a_dataset(tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
-    radius, k, rng = 5e-6, 0.05, np.random.default_rng(1)
-    moduli = np.array([[1e3, 2e3], [4e3, np.nan]])
-    height = np.linspace(1.5e-6, -1.5e-6, 400)
-    path = tmp_path / "cells.h5"
-    with h5py.File(path, "w") as file:
-        file.attrs["software"] = "afmformats"
-        cells = [(y, x) for y in range(2) for x in range(2) if np.isfinite(moduli[y, x])]
-        for number, (y, x) in enumerate(cells):
-            # Hertz in closed form: the force over the indentation, and the height of the base.
-            indentation = np.linspace(0, 3e-6, 20000)
-            force = 4 / 3 * moduli[y, x] / 0.75 * np.sqrt(radius) * indentation**1.5
-            way = np.interp(-height, indentation + force / k, force, left=0)
-            forces = np.concatenate([way, way[::-1]]) + rng.normal(0, 5e-12, 800)
-            group = file.create_group(str(number))
-            group.attrs.update({"spring constant": k, "imaging mode": "force-distance"})
-            for name, of in (("x", x), ("y", y)):
-                group.attrs.update({f"grid shape {name}": 2, f"grid size {name}": 4e-6})
-                group.attrs.update({f"grid center {name}": 0, f"grid index {name}": of})
-            group["force"] = forces
-            group["height (measured)"] = np.concatenate([height, height[::-1]])
-            group["segment"] = np.repeat([0, 1], 400)
+def test_a_map_in_an_instruments_file_is_a_dataset(
+    cell_map: tuple[Path, np.ndarray],
+) -> None:
+    path, moduli = cell_map
     ds = nanotap.fit_map(path, tip_radius="5 um", progress=False)
     assert ds.x.values == pytest.approx([1e-6, 3e-6])
     modulus = ds["sample.modulus"]

@@ -24,15 +24,16 @@ mod threads;
 
 use std::ffi::OsString;
 
-use clap::Parser as _;
-
-use command::Arguments;
 use output::Output;
 
 /// Runs the command line `arguments`, whose first item is the program's name, and returns the exit
-/// code: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM.
-pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
-    let arguments = match Arguments::try_parse_from(arguments) {
+/// code: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM. `version` is what
+/// `--version` prints: the program's, with its commit.
+pub fn run(
+    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    version: &'static str,
+) -> u8 {
+    let arguments = match command::parse(arguments, version) {
         Ok(arguments) => arguments,
         Err(error) => {
             // A closed pipe has no reader.

@@ -7,5 +7,8 @@ use std::process::ExitCode;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
-    ExitCode::from(nanotap_cli::run(std::env::args_os()))
+    ExitCode::from(nanotap_cli::run(
+        std::env::args_os(),
+        nanotap_version::version!(),
+    ))
 }

@@ -84,5 +84,5 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// code.
 #[pyfunction]
 fn run_command_line(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
-    py.detach(|| nanotap_cli::run(arguments))
+    py.detach(|| nanotap_cli::run(arguments, nanotap_version::version!()))
 }

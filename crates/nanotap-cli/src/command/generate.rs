@@ -98,9 +98,7 @@ fn completions(shell: Shell) -> String {
 /// The command line, every command of it by its whole name, as in `nanotap-orbit`; the same on every
 /// machine.
 fn command() -> clap::Command {
-    let mut command = super::Arguments::command()
-        .disable_help_subcommand(true)
-        .long_version(env!("CARGO_PKG_VERSION"));
+    let mut command = super::Arguments::command().disable_help_subcommand(true);
     command.build();
     command
 }

@@ -31,8 +31,10 @@ mod study;
 mod sweep;
 mod window;
 
+use std::ffi::OsString;
+
 use clap::builder::styling::{AnsiColor, Styles};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::failure::Failure;
 use crate::output::Output;
@@ -62,7 +64,7 @@ is kept: reports of what was found so far, chunks of datasets).";
 /// Dynamics of an AFM cantilever whose tip taps a sample: its motions, their stability, and the
 /// quantities that an experiment measures.
 #[derive(Debug, Parser)]
-#[command(name = "nanotap", version, long_version = long_version(), styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
+#[command(name = "nanotap", version, styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {
     /// Print one JSON document on standard output, and nothing else
     #[arg(long, global = true)]
@@ -80,11 +82,17 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// The version, and the vector instructions that the program uses.
-fn long_version() -> String {
-    let version = env!("CARGO_PKG_VERSION");
+/// Parses the command line of a program with this version, the program's name first.
+pub(crate) fn parse(
+    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    version: &'static str,
+) -> Result<Arguments, clap::Error> {
     let instructions = nanotap::model::vector_instructions();
-    format!("{version}\nvector instructions: {instructions}")
+    let mut command = Arguments::command()
+        .version(version)
+        .long_version(format!("{version}\nvector instructions: {instructions}"));
+    let matches = command.try_get_matches_from_mut(arguments)?;
+    Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
 /// Every command.

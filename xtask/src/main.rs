@@ -11,6 +11,7 @@
 
 mod benches;
 mod book;
+mod dist;
 mod figures;
 mod package;
 mod peers;

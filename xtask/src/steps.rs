@@ -5,7 +5,7 @@ use std::process::Command;
 use crate::process::{check, must, tests};
 use crate::tally::Tally;
 use crate::tools::{PYTHON, Workspace};
-use crate::{benches, book, figures, package, peers, wheel};
+use crate::{benches, book, dist, figures, package, peers, wheel};
 
 /// A task of `cargo xtask`.
 pub(crate) struct Step {
@@ -92,6 +92,12 @@ pub(crate) static OTHER_TASKS: &[Step] = &[
         },
     },
     Step {
+        name: "dist",
+        about: "build what a release publishes for this machine in target/dist (--out DIR)",
+        takes_options: true,
+        run: dist::run,
+    },
+    Step {
         name: "signatures",
         about: "write the Python functions from the studies' declarations",
         takes_options: false,
@@ -108,6 +114,12 @@ pub(crate) static OTHER_TASKS: &[Step] = &[
         about: "run every bench and write docs/benches.md",
         takes_options: false,
         run: |workspace, _| benches::run(workspace),
+    },
+    Step {
+        name: "build-times",
+        about: "measure what each crate costs a build; fail if all cost a tenth more than docs/performance.md says",
+        takes_options: false,
+        run: |workspace, _| build_times(workspace),
     },
     Step {
         name: "book",
@@ -199,6 +211,15 @@ fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> 
 fn reference(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["run", "--release", "--package", "nanotap-book", "--"]);
     command.arg(&workspace.root).arg("--reference");
+    check(&workspace.root, &mut command)
+}
+
+/// Builds what is released from nothing, and compares the processor time with the recorded one.
+fn build_times(workspace: &Workspace) -> Result<Tally, String> {
+    let mut command = Command::new(PYTHON);
+    command
+        .args(["xtask/build_times.py", "docs/performance.md"])
+        .env("CARGO", workspace.cargo_program());
     check(&workspace.root, &mut command)
 }
 

@@ -30,6 +30,10 @@ impl Workspace {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let target = std::env::var_os("CARGO_TARGET_DIR")
             .map_or_else(|| root.join("target"), |target| root.join(target));
+        Self::building_in(root, cargo, target)
+    }
+
+    fn building_in(root: PathBuf, cargo: OsString, target: PathBuf) -> Self {
         let interpreter = interpreter(&root, &target);
         Self {
             root,
@@ -37,6 +41,11 @@ impl Workspace {
             target,
             interpreter,
         }
+    }
+
+    /// This checkout with another build folder; calls of cargo need it in `CARGO_TARGET_DIR`, too.
+    pub(crate) fn with_target(&self, target: PathBuf) -> Self {
+        Self::building_in(self.root.clone(), self.cargo.clone(), target)
     }
 
     /// Prepares a call of `cargo` with these arguments.
@@ -183,10 +192,7 @@ fn interpreter(root: &Path, target: &Path) -> Option<PathBuf> {
     const CONTENT: &str = "implementation=CPython\nversion=3.11\n\
         target_abi=CPython-abi3-3.11\nshared=true\nbuild_flags=\n\
         suppress_build_script_link_lines=false";
-    let version = process::output(root, Command::new("rustc").arg("-vV"))?;
-    let host = version
-        .lines()
-        .find_map(|line| line.strip_prefix("host: "))?;
+    let host = host(root)?;
     let folder = target.join("maturin");
     let path = folder.join(format!("pyo3-config-{host}-3.11-abi3.txt"));
     if !path.exists() {
@@ -194,4 +200,12 @@ fn interpreter(root: &Path, target: &Path) -> Option<PathBuf> {
         fs::write(&path, CONTENT).ok()?;
     }
     Some(path)
+}
+
+/// The target triple of this machine.
+pub(crate) fn host(root: &Path) -> Option<String> {
+    let version = process::output(root, Command::new("rustc").arg("-vV"))?;
+    let mut lines = version.lines();
+    let host = lines.find_map(|line| line.strip_prefix("host: "))?;
+    Some(host.to_owned())
 }

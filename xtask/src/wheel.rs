@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use crate::process::must;
-use crate::tools::{Environment, Workspace};
+use crate::tools::{Environment, PYTHON, Workspace};
 
 /// Builds the wheel and leaves it as the only one in `target/wheels`.
 ///
@@ -18,14 +19,9 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
         // A wheel that cannot be removed is reported below.
         let _ = fs::remove_file(old);
     }
-    let mut command = workspace.python_tool("maturin")?;
-    command.args(["build", "--release", "--locked"]);
-    command
-        .args(["--interpreter", "python3", "--out"])
-        .arg(&folder);
     must(
         &workspace.root,
-        &mut command,
+        &mut maturin(workspace, &folder)?,
         "the wheel could not be built",
     )?;
     match with_extension(&folder, "whl").as_slice() {
@@ -36,6 +32,17 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
             folder.display()
         )),
     }
+}
+
+/// Prepares the call of maturin that builds the wheel into `folder`.
+///
+/// # Errors
+/// If maturin is missing and cannot be installed.
+pub(crate) fn maturin(workspace: &Workspace, folder: &Path) -> Result<Command, String> {
+    let mut command = workspace.python_tool("maturin")?;
+    command.args(["build", "--release", "--locked"]);
+    command.args(["--interpreter", PYTHON, "--out"]).arg(folder);
+    Ok(command)
 }
 
 /// The files in `folder` whose names end in `.extension`.

@@ -61,5 +61,7 @@ def cell_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray
                 )
             group["force"] = forces
             group["height (measured)"] = np.concatenate([height, height[::-1]])
+            group["force"].attrs["unit"] = "N"
+            group["height (measured)"].attrs["unit"] = "m"
             group["segment"] = np.repeat([0, 1], 400)
     return path, moduli

@@ -112,7 +112,7 @@ fn the_worked_case_of_a_map_is_that_of_its_real_file() {
     let copy = folder.path().join("cells.jpk-qi-data");
     std::fs::copy(package.join(file), copy).unwrap();
     let done = crate::worked_cases::follow_in(&folder, "qi-map.md");
-    assert_eq!(done, (2, 13));
+    assert_eq!(done, (3, 16));
 }
 
 /// Force curve of a sphere on an elastic half-space, in SI: the lever's base goes down by `travel` from

@@ -645,8 +645,9 @@ def fit(
     free : Sequence[str] | None
         Parameters to find: keys of the case, gap.offset, NAME.offset or NAME.scale
         of a column, and terms of the instrument: NAME.tilt, NAME.curvature,
-        NAME.interference, NAME.drag, gap.drift, gap.backlash; default for a force
-        curve: modulus, contact point, baseline, and the adhesion of the law.
+        NAME.interference, NAME.drag, gap.drift, gap.backlash; of a force curve
+        without other names than these terms, too: modulus, contact point, baseline,
+        and the adhesion of the law.
     per_curve : Sequence[str] | None
         Parameters to find with one value per curve.
     convert : Sequence[str] | None

@@ -217,6 +217,7 @@ impl Studied<'_> {
             && case.is_physical()
             && low < high
             && !data.is_force_curve();
+        let mut scales = Vec::new();
         let (mut figure, factor) = if distance {
             let options =
                 object(json!({ "points": APPROACH[0], "from": length(high), "to": length(low) }));
@@ -224,16 +225,23 @@ impl Studied<'_> {
             let Approached { figure, axis, .. } = Approached::of(case, &report);
             (figure, axis.factor)
         } else {
-            let kind = swept.map_or(Kind::Number, Key::kind);
-            let (factor, unit) = match kind {
-                Kind::Number => (1.0, String::new()),
-                kind => prefixed(kind, 1.0, low.abs().max(high.abs())),
+            let scaled = |kind: Option<Kind>, most: f64| match kind {
+                Some(kind) if case.is_physical() && kind != Kind::Number => {
+                    prefixed(kind, 1.0, most)
+                }
+                _ => (1.0, String::new()),
             };
+            let (factor, unit) = scaled(swept.map(Key::kind), low.abs().max(high.abs()));
             let label = swept.map_or("", Key::path);
             let mut figure = Figure::new(1, data.columns.len());
-            for column in &data.columns {
+            for (k, column) in data.columns.iter().enumerate() {
+                let known = data.rows().filter_map(|row| *row.values.get(k)?);
+                let most = known.fold(0.0, |most: f64, value| most.max(value.abs()));
+                let (scale, of_column) = scaled(column.quantity.kind(), most);
+                scales.push(scale);
                 let x = Axes::linear(label).unit(unit.clone());
-                figure = figure.with(Panel::new(x, Axes::linear(column.name.clone())));
+                let y = Axes::linear(column.name.clone()).unit(of_column);
+                figure = figure.with(Panel::new(x, y));
             }
             (figure, factor)
         };
@@ -253,7 +261,7 @@ impl Studied<'_> {
             };
             let drawn = |value: f64| match place.and_then(|place| heights.get(place)) {
                 Some(height) if distance => height.of_measured(value),
-                _ => value,
+                _ => value * scales.get(k).copied().unwrap_or(1.0),
             };
             let points = data.rows().filter_map(|row| {
                 let value = (*row.values.get(k)?)?;

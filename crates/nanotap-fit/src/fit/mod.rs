@@ -399,7 +399,12 @@ fn with_search<R>(
             .find(|curve| curve.name == channels.table);
         channels.rows = own.map_or(channels.rows, |curve| curve.rows.len());
     }
-    if data.is_force_curve() && free.iter().chain(&per_curve).all(|name| terms::is_term(name)) {
+    if data.is_force_curve()
+        && free
+            .iter()
+            .chain(&per_curve)
+            .all(|name| terms::is_term(name))
+    {
         let note = force_curve::free_by_default(&case, &data, &mut free, &mut per_curve)?;
         preparation.push(note);
     }

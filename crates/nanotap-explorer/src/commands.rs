@@ -150,8 +150,8 @@ pub(crate) fn study_python(
     let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?}{set})\n");
     for (name, request) in studies {
         let name = match *name {
-            // The fits of a force volume are another function of Python.
-            "fit" if request.contains_key("pixels") => "fit_map".to_owned(),
+            // The fits of a map are another function of Python.
+            "fit" if request.contains_key("out") => "fit_map".to_owned(),
             name => name.replace('-', "_"),
         };
         let _ = write!(text, "{name} = nanotap.{name}(case");

@@ -1171,6 +1171,43 @@ pub fn wrapped(degrees: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// A deflection over the distance: contact in the nearest twelfth, and a tilted baseline.
+    fn tilted(distance: f64) -> f64 {
+        0.3 * distance + (8.0 - distance).max(0.0)
+    }
+
+    #[test]
+    fn a_tilted_baseline_does_not_hide_where_contact_is() {
+        let rising: Vec<f64> = (0..100).map(f64::from).collect();
+        let values: Vec<f64> = rising.iter().map(|z| tilted(*z)).collect();
+        assert!(!bends_far(&rising, &values));
+        let falling: Vec<f64> = rising.iter().map(|z| -z).collect();
+        assert!(bends_far(&falling, &values));
+    }
+
+    #[test]
+    fn approach_and_retract_tell_which_way_the_distance_counts() {
+        let there: Vec<f64> = (0..50).map(|k| 50.0 - f64::from(k)).collect();
+        let both: Vec<f64> = there.iter().chain(there.iter().rev()).copied().collect();
+        let words = |first: &str, second: &str| Table {
+            columns: vec![(
+                "direction".to_owned(),
+                (0..100)
+                    .map(|k| Entry::Text(if k < 50 { first } else { second }.to_owned()))
+                    .collect(),
+            )],
+            ..Table::default()
+        };
+        let measured = words("approach", "retract");
+        assert_eq!(approach_rises(&measured, &both), Some(false));
+        let turned: Vec<f64> = both.iter().map(|z| -z).collect();
+        assert_eq!(approach_rises(&measured, &turned), Some(true));
+        // Rows that are sorted by distance do not tell.
+        let sorted: Vec<f64> = there.iter().chain(&there).copied().collect();
+        assert_eq!(approach_rises(&measured, &sorted), None);
+        assert_eq!(approach_rises(&words("retract", "approach"), &both), None);
+    }
+
     #[test]
     fn rules_are_linear_or_a_factor_with_units_or_a_name() {
         for (rule, factor, offset) in [

@@ -527,7 +527,7 @@ impl LawRests {
             a = next;
             let width = (b.0.gap - a.0.gap).abs();
             let least = f64::EPSILON * a.0.gap.abs().max(b.0.gap.abs()) / width;
-            if a.1 == 0.0 || !(least < 0.5) {
+            if a.1 == 0.0 || least.is_nan() || least >= 0.5 {
                 break;
             }
             let xi = (a.0.gap - b.0.gap) / (c.0.gap - b.0.gap);

@@ -107,7 +107,7 @@ fn covered(
     table: impl Fn(&mut Random) -> Table + Sync,
 ) -> [usize; 3] {
     let one = |repetition: u64| {
-        let table = table(&mut Random(1000 + repetition));
+        let table = table(&mut Random::new(1000 + repetition));
         let asked = FitOptions {
             jumps,
             ..request(vec![table], &FREE)

@@ -489,8 +489,7 @@ const MAX_HEAD: usize = 200;
 
 impl Head {
     /// Excel states the separator in a line of its own, `sep=;`. The names are in the first line that is no
-    /// comment, unless the numbers have another number of fields: then in the line before them, or, with
-    /// units, in the one before that.
+    /// comment, unless the lines after it have another number of fields.
     fn of(text: &str) -> Self {
         let lines = text.lines().take(MAX_HEAD).enumerate();
         let mut lines = lines
@@ -530,21 +529,17 @@ fn stated_separator(line: &str) -> Option<u8> {
     is_one.then(|| mark.as_bytes()[0])
 }
 
-/// The line, by its index, that names the columns: above the first numbers, and above their units, among the
-/// last lines with one number of fields. The very last may be cut.
+/// The line, by its index, that names the columns: the first of the last lines that have one number of
+/// fields. The very last may be cut.
 fn names(lines: &[(usize, &str)], separator: u8) -> Option<usize> {
-    let fields = |(_, line): &(usize, &str)| -> csv::StringRecord {
-        line.split(char::from(separator)).map(str::trim).collect()
-    };
+    let fields = |(_, line): &(usize, &str)| line.split(char::from(separator)).count();
     let whole = &lines[..lines.len().checked_sub(1)?];
-    let count = fields(whole.last()?).len();
-    let other = whole.iter().rposition(|line| fields(line).len() != count);
-    let begin = other.map_or(0, |other| other + 1);
-    let has_numbers = |line| fields(line).iter().any(|field| decimal(field).is_some());
-    let first = begin + lines[begin..].iter().position(has_numbers)?;
-    let has_units = first >= begin + 2 && is_units(&fields(&lines[first - 1]));
-    let names = first.checked_sub(1 + usize::from(has_units))?;
-    (count > 1 && names >= begin).then_some(names)
+    let count = fields(whole.last()?);
+    let other = whole.iter().rposition(|line| fields(line) != count);
+    let first = other.map_or(0, |other| other + 1);
+    let mut words = lines[first].1.split(char::from(separator));
+    let are_words = words.all(|word| decimal(word.trim()).is_none());
+    (count > 1 && are_words).then_some(first)
 }
 
 impl Serialize for Table {
@@ -650,6 +645,9 @@ mod tests {
         assert_eq!(table.columns[0].1, [Entry::Number(1.5), Entry::Number(2.5)]);
         assert_eq!(table.lines, [6, 7]);
         assert_eq!(table.remarks.len(), 1);
+        // Words that may be of the table are kept.
+        let table = Table::parse("t", "way,z\napproach,\nretract,2\n").unwrap();
+        assert_eq!(table.columns[0].0, "way");
         let error = Table::parse("t", "Operator;Max\nz;d\n1;2\n3\n4;5\n").unwrap_err();
         assert!(error.message().contains("line 4"), "{}", error.message());
     }

@@ -200,6 +200,29 @@ fn errors(found: &Value, of: &Hertz) -> [f64; 2] {
 }
 
 #[test]
+fn an_export_of_a_german_excel_is_fitted() {
+    let folder = Folder::new();
+    let mut text = "sep=;\r\nGerät: XY;3;5\r\n\r\nHöhe (nm);Biegung (nm)\r\n".to_owned();
+    for [z, d] in SOFT.rows(300, 1.0, false) {
+        let line = format!("{z:.4};{d:.4}\r\n").replace('.', ",");
+        text.push_str(&line);
+    }
+    text.push_str("1471");
+    std::fs::write(folder.path().join("kurve.csv"), text).unwrap();
+    let mut arguments = vec!["kurve.csv", "--tip-radius", "5 um"];
+    arguments.extend(["--spring-constant", "0.05 N/m"]);
+    arguments.extend(["--convert", "Höhe=distance"]);
+    arguments.extend(["--convert", "Biegung=deflection"]);
+    let found = fitted(&folder, &arguments);
+    let [modulus, contact] = errors(&found, &SOFT);
+    assert!(modulus.abs() < 0.01 && contact.abs() < 5.0, "{found}");
+    assert!(
+        found["preparation"].to_string().contains("cut off"),
+        "{found}"
+    );
+}
+
+#[test]
 fn any_height_direction_and_baseline_gives_the_modulus() {
     let folder = Folder::new();
     let lever = ["--spring-constant", "0.05 N/m", "--tip-radius", "5 um"];

@@ -12,7 +12,7 @@ const MAX_ROWS: usize = 20_000;
 /// name, is 0: then every row counts.
 pub(super) fn averaged(tables: &[Table], columns: &[String], rows: usize) -> Option<Vec<Table>> {
     let is_long =
-        |table: &Table| table.rows() > 2 * MAX_ROWS && is_plain_force_curve(table, columns);
+        |table: &Table| table.rows() > 2 * MAX_ROWS && is_plain_force_curve(table, columns, &[]);
     if rows == 0 || !tables.iter().any(is_long) {
         return None;
     }

@@ -103,7 +103,7 @@ pub fn implied_words(
     let other = request
         .data
         .iter()
-        .find(|table| !is_plain_force_curve(table, &columns));
+        .find(|table| !is_plain_force_curve(table, &columns, &request.convert));
     if let Some(table) = other {
         let states_tip = request.tip_radius.is_some() || request.half_angle.is_some();
         if states_tip && error.source.is_none() && words.is_empty() {

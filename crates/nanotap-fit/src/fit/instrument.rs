@@ -726,10 +726,25 @@ fn distance_of_separation(
 }
 
 /// Whether a table as it is written is a force curve, by the names of its columns, of which `columns` are
-/// used, or all: there is a deflection, and nothing of an oscillation.
-pub(super) fn is_plain_force_curve(table: &Table, columns: &[String]) -> bool {
+/// used, or all, and which `conversions` rename: there is a deflection, and nothing of an oscillation.
+pub(super) fn is_plain_force_curve(
+    table: &Table,
+    columns: &[String],
+    conversions: &[String],
+) -> bool {
+    let renames = conversions.iter().filter_map(|text| {
+        let Conversion { name, renamed, .. } = Conversion::parse(text).ok()?;
+        Some((name, renamed?))
+    });
+    let renames: Vec<(String, String)> = renames.collect();
+    let name = |written: &str| {
+        let renamed = renames
+            .iter()
+            .find(|(own, _)| Header::is_called(written, own));
+        plain(&renamed.map_or_else(|| Header::of(written).name, |(_, name)| name.clone()))
+    };
     let chosen = table.columns.iter().filter(|(w, _)| is_chosen(w, columns));
-    let names: Vec<String> = chosen.map(|(w, _)| plain(&Header::of(w).name)).collect();
+    let names: Vec<String> = chosen.map(|(w, _)| name(w)).collect();
     let known = |name: &String| {
         let known = NAMES.iter().find(|(own, _)| own == name);
         let name = known.map_or(name.as_str(), |(_, name)| name);

@@ -265,7 +265,8 @@ pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
 /// curves.
 fn segment_of_laws(case: &Case, request: &FitOptions) -> Option<Segment> {
     let columns = names(&request.columns);
-    let is_force_curve = |table: &Table| instrument::is_plain_force_curve(table, &columns);
+    let is_force_curve =
+        |table: &Table| instrument::is_plain_force_curve(table, &columns, &request.convert);
     let of_force_curves = request.data.iter().all(is_force_curve);
     let default = || of_force_curves.then(|| selection::default_segment(case, request));
     request.segment.or_else(default)

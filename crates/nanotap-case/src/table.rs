@@ -488,8 +488,8 @@ const SEPARATORS: [u8; 3] = *b"\t;,";
 const MAX_HEAD: usize = 200;
 
 impl Head {
-    /// Excel states the separator in a line of its own, `sep=;`. The names are in the first line that is no
-    /// comment, unless the lines after it have another number of fields.
+    /// A file of Excel may begin with a line that states the separator, such as `sep=;`. The names are in the
+    /// first line after it that is no comment, unless the lines below have another number of fields.
     fn of(text: &str) -> Self {
         let lines = text.lines().take(MAX_HEAD).enumerate();
         let mut lines = lines

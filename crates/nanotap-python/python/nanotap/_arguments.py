@@ -244,8 +244,8 @@ _written = json.JSONEncoder(allow_nan=False).encode
 
 
 class _Option(NamedTuple):
-    """JSON types that an option takes, the type of an array's entries, and whether an object has fields
-    of its own, not sides of a box."""
+    """JSON types that an option takes, the type of an array's entries, and whether the names of an object's
+    fields are fixed."""
 
     kinds: frozenset[str]
     entries: str | None

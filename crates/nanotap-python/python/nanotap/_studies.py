@@ -466,14 +466,7 @@ def fit(
     progress: Progress,
 ) -> Fit:
     """The parameters that describe measured curves best; `case` may be a case, its file, or the data."""
-    data = options["data"]
-    if data is None and isinstance(case, Case):
-        message = "data: expected measured curves"
-        raise TypeError(message)
-    if data is None:
-        case, data = None, case
-    elif isinstance(case, str | os.PathLike):
-        case = Case.from_file(case)
+    case, data = _case_and_data(case, options["data"])
     lists = {
         name: _arguments.names(name, options[name])
         for name in ("free", "per_curve", "columns", "convert", "start", "pixels")
@@ -483,12 +476,29 @@ def fit(
     asked = {**options, **lists, "data": _arguments.tables(data, number)}
     assumed: list[str] = []
     if case is None:
-        words, assumed = _nanotap.implied_case(_arguments.request("fit", asked))
-        case = Case(**dict(word.split("=", 1) for word in words))
+        case, assumed = _implied_case(asked)
     document, answer, units, interrupted = _run("fit", case, asked, threads, progress)
     if assumed:
         document["preparation"] = [*assumed, *document.get("preparation", ())]
     return _finished(Fit(document, answer, units, ("fit", "")), interrupted)
+
+
+def _case_and_data(case: Any, data: Any) -> tuple[Case | None, Any]:
+    """The case, None where the data imply it, and the data; `case` may be a case, its file, or the data."""
+    if data is None and isinstance(case, Case):
+        message = "data: expected measured curves"
+        raise TypeError(message)
+    if data is None:
+        return None, case
+    if isinstance(case, str | os.PathLike):
+        return Case.from_file(case), data
+    return case, data
+
+
+def _implied_case(asked: Mapping[str, Any]) -> tuple[Case, list[str]]:
+    """The case that options and data of a fit imply, and sentences on what is assumed."""
+    words, assumed = _nanotap.implied_case(_arguments.request("fit", asked))
+    return Case(**dict(word.split("=", 1) for word in words)), assumed
 
 
 @stoppable()
@@ -554,25 +564,26 @@ def fit_map(
         >>> ds["sample.stiffness"].values.round(3)
         array([5., 5.])
     """
-    if data is None:
-        case, data = None, case
+    case, data = _case_and_data(case, data)
     named = {**options, "pixels": pixels, "free": free}
     lists = {
         name: _arguments.names(name, named[name])
         for name in ("columns", "convert", "start", "pixels", "free")
         if named.get(name) is not None
     }
+    is_file = pixels is None and isinstance(data, str | os.PathLike)
+    if pixels is None and not is_file:
+        message = "pixels: name the columns of the table that tell the pixel"
+        raise TypeError(message)
     asked = {**options, **lists, "data": _arguments.tables(data)}
     if case is None:
-        words, _ = _nanotap.implied_case(_arguments.request("fit", asked))
-        case = Case(**dict(word.split("=", 1) for word in words))
+        case, _ = _implied_case(asked)
+    if is_file:
+        # The curves are read when they are fitted.
+        del asked["data"]
     request = _arguments.request("fit", asked)
-    if pixels is None:
-        if not isinstance(data, str | os.PathLike):
-            message = "pixels: name the columns of the table that tell the pixel"
-            raise TypeError(message)
-        whole = _arguments.request("fit", {**asked, "data": []})
-        request = json.dumps({**json.loads(whole), "file": os.fspath(existing(data))})
+    if is_file:
+        request = json.dumps({**json.loads(request), "file": os.fspath(existing(data))})
     plan = ("fit", _cased(case), request)
     ds = _datasets.computed(plan, "rows", out, chunk, threads, client, progress)
     return ds.assign(result=_datasets.in_words(ds.result))

@@ -506,14 +506,16 @@ impl Head {
         };
         let separator = stated.or_else(|| SEPARATORS.into_iter().max_by_key(count));
         let separator = separator.unwrap_or(b',');
-        let others: Vec<u8> = stated.map_or_else(|| SEPARATORS.to_vec(), |stated| vec![stated]);
+        let possible = stated
+            .as_ref()
+            .map_or(&SEPARATORS[..], std::slice::from_ref);
         let names = |separator: &u8| Some((names(&lines, *separator)?, *separator));
-        match others.iter().find_map(names) {
-            Some((0, _)) | None => Self { separator, skipped },
-            Some((at, separator)) => Self {
+        match possible.iter().find_map(names) {
+            Some((at, separator)) if at > 0 => Self {
                 separator,
                 skipped: lines[at].0,
             },
+            _ => Self { separator, skipped },
         }
     }
 }

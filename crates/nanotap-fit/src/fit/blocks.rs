@@ -1,6 +1,7 @@
 //! Averages of blocks of rows, before anything else is done to a long table: a force curve of a million
 //! rows then takes the time and the memory of one of some ten thousand.
 
+use super::FitOptions;
 use super::data::error_of;
 use super::instrument::is_plain_force_curve;
 use nanotap_case::table::{Entry, Header, Table};
@@ -8,12 +9,14 @@ use nanotap_case::table::{Entry, Header, Table};
 /// Tables of force curves with more rows are averaged to about this number.
 const MAX_ROWS: usize = 20_000;
 
-/// The tables, of which `columns` are used, with the long ones averaged; `None` if there are none, or if `rows`, the option of that
-/// name, is 0: then every row counts.
-pub(super) fn averaged(tables: &[Table], columns: &[String], rows: usize) -> Option<Vec<Table>> {
-    let is_long =
-        |table: &Table| table.rows() > 2 * MAX_ROWS && is_plain_force_curve(table, columns, &[]);
-    if rows == 0 || !tables.iter().any(is_long) {
+/// The tables of a request, of which `columns` are used, with the long force curves averaged; `None` if there
+/// are none, or if `rows` of the request is 0: then every row counts.
+pub(super) fn averaged(request: &FitOptions, columns: &[String]) -> Option<Vec<Table>> {
+    let tables = &request.data;
+    let is_long = |table: &Table| {
+        table.rows() > 2 * MAX_ROWS && is_plain_force_curve(table, columns, &request.convert)
+    };
+    if request.rows == 0 || !tables.iter().any(is_long) {
         return None;
     }
     let averaged = tables.iter().map(|table| {

@@ -352,7 +352,7 @@ fn with_search<R>(
         ));
     }
     let columns = names(&request.columns);
-    let averaged = blocks::averaged(&request.data, &columns, request.rows);
+    let averaged = blocks::averaged(request, &columns);
     let tables = averaged.as_ref().unwrap_or(&request.data);
     let measured = instrument::prepared(case, tables, &request.convert, &columns)?;
     drop(averaged);

@@ -2,7 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use crate::clock::Instant;
 
 /// Time that a computation with a [grace period](CancelFlag::with_grace) may continue.
 const GRACE: Duration = Duration::from_millis(300);

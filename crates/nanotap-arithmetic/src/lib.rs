@@ -10,6 +10,7 @@
 //! [`CancelFlag`] is here because every crate with long computations polls it.
 
 mod cancel;
+pub mod clock;
 mod dual;
 mod eigenvalues;
 

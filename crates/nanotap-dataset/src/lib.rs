@@ -1,4 +1,4 @@
-//! Datasets of many runs: chunked stores on disk that open with `xarray.open_zarr`.
+//! Datasets of many runs: chunked stores, on disk or in memory, that open with `xarray.open_zarr`.
 //!
 //! A store is a folder in the Zarr format, version 2, with consolidated metadata, which every Zarr
 //! reader can open (Python, Julia, MATLAB, C++, Rust). Arrays have named dimensions, coordinates

@@ -51,7 +51,9 @@ pub(super) fn packed(schema: &Schema) -> Option<Schema> {
 /// # Errors
 /// If the file system fails, or a chunk is damaged; the dataset is then as it was.
 pub fn finish(store: Store) -> Result<Store, StoreError> {
-    let Some(schema) = packed(store.schema()).filter(|_| store.missing() == 0) else {
+    let Some(schema) =
+        packed(store.schema()).filter(|_| store.missing() == 0 && !store.is_in_memory())
+    else {
         return Ok(store);
     };
     let there = Store::open(store.path())?;

@@ -205,6 +205,17 @@ impl Schema {
         self.variables.iter().position(|v| v.name == name)
     }
 
+    /// Bytes of the values of all variables; `None` if there are more than a machine can number.
+    pub fn bytes(&self) -> Option<usize> {
+        let lengths = self.grid.axes.iter().map(|axis| axis.length);
+        let entry: usize = self
+            .variables
+            .iter()
+            .map(|v| v.stride() * v.kind.size())
+            .sum();
+        lengths.into_iter().try_fold(entry, usize::checked_mul)
+    }
+
     /// Values along an axis of the grid; for labels that are not numbers, their indices.
     pub fn axis_values(&self, axis: usize) -> Vec<f64> {
         let axis = &self.grid.axes[axis];

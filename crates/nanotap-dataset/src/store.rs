@@ -1,9 +1,11 @@
-//! A dataset on disk.
+//! A dataset on disk, or in memory.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Map, Value, json};
 
@@ -14,7 +16,9 @@ use super::pack;
 use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
 use super::zarr;
 use crate::files::{self, is_temporary};
-use nanotap_case::input::{self, InputError, MAX_DOCUMENT_BYTES, MAX_TABLE_BYTES, Origin};
+use nanotap_case::input::{
+    self, InputError, InputFault, MAX_DOCUMENT_BYTES, MAX_TABLE_BYTES, Origin,
+};
 
 /// The folder of markers, one per finished chunk. Zarr readers look at the metadata only and ignore
 /// it.
@@ -26,7 +30,10 @@ const LAYOUT: &str = "chunk_layout";
 /// The attribute from which xarray knows coordinates that do not label a dimension.
 const COORDINATES: &str = "coordinates";
 
-/// A dataset on disk.
+/// Files by their paths.
+type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// A dataset on disk, or in memory, where it ends with the store.
 ///
 /// A chunk is finished if its marker, `.chunks/<index>`, exists and states the length and the
 /// CRC-32 of the chunk's file for every variable. Markers are read when the store is opened.
@@ -38,6 +45,8 @@ pub struct Store {
     /// Whether the chunks of the computation were joined into larger ones.
     packed: bool,
     finished: Vec<AtomicBool>,
+    /// The files of a store in memory.
+    memory: Option<Mutex<Files>>,
 }
 
 impl Store {
@@ -79,6 +88,14 @@ impl Store {
         make_folder(&path.join(MARKERS))?;
         store.write_documents()?;
         Ok(store)
+    }
+
+    /// Creates a store in memory: for a figure that is drawn at once, and where there is no disk.
+    pub fn in_memory(schema: Schema) -> Self {
+        let metadata = consolidated(&documents(&schema, false));
+        let mut store = Self::unread(Path::new(""), schema, metadata, false);
+        store.memory = Some(Mutex::default());
+        store
     }
 
     /// Creates a store object for `path` without writing anything; `packed` if chunks are joined.
@@ -177,16 +194,20 @@ impl Store {
         Ok(Self::with(path, schema, metadata, packed))
     }
 
-    fn with(path: &Path, schema: Schema, metadata: String, packed: bool) -> Self {
+    fn unread(path: &Path, schema: Schema, metadata: String, packed: bool) -> Self {
         let chunks = schema.grid.chunks();
-        let mut store = Self {
+        Self {
             path: path.into(),
             schema,
             metadata,
             packed,
-            finished: Vec::new(),
-        };
-        store.finished = (0..chunks).map(|_| AtomicBool::new(false)).collect();
+            finished: (0..chunks).map(|_| AtomicBool::new(false)).collect(),
+            memory: None,
+        }
+    }
+
+    fn with(path: &Path, schema: Schema, metadata: String, packed: bool) -> Self {
+        let store = Self::unread(path, schema, metadata, packed);
         // What the metadata declare costs nothing; only chunks with a marker are looked at.
         for chunk in store.marked() {
             store.finished[chunk].store(store.is_whole(chunk), Ordering::Release);
@@ -208,7 +229,30 @@ impl Store {
         names.filter_map(chunk).collect()
     }
 
-    /// Returns the path of the folder of the store.
+    /// The files of a store in memory; `None` on disk.
+    fn memory(&self) -> Option<MutexGuard<'_, Files>> {
+        let files = self.memory.as_ref()?;
+        Some(files.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Reads a file of the store of at most `limit` bytes.
+    fn read(&self, path: PathBuf, limit: u64) -> Result<Vec<u8>, InputError> {
+        let Some(files) = self.memory() else {
+            return input::read(&path, limit, Origin::File);
+        };
+        let missing = || InputError {
+            path: path.clone(),
+            fault: InputFault::Missing,
+        };
+        files.get(&path).cloned().ok_or_else(missing)
+    }
+
+    /// Whether the store is in memory.
+    pub(super) const fn is_in_memory(&self) -> bool {
+        self.memory.is_some()
+    }
+
+    /// Returns the path of the folder of the store; empty in memory.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -266,7 +310,7 @@ impl Store {
     fn read_file(&self, variable: &Variable, block: &Block) -> Result<Vec<u8>, InputError> {
         let entries = self.schema.grid.chunk_entries() * variable.stride();
         let limit = longest_stream(entries * variable.kind.size());
-        input::read(&self.file(variable, block), limit, Origin::File)
+        self.read(self.file(variable, block), limit)
     }
 
     fn file(&self, variable: &Variable, block: &Block) -> PathBuf {
@@ -320,11 +364,18 @@ impl Store {
     pub(super) fn write_files(&self, block: &Block, files: &[Vec<u8>]) -> Result<(), StoreError> {
         let mut marker = String::new();
         for (variable, bytes) in self.schema.variables.iter().zip(files) {
-            write_whole(&self.file(variable, block), bytes)?;
+            let path = self.file(variable, block);
+            if let Some(mut files) = self.memory() {
+                files.insert(path, bytes.clone());
+                continue;
+            }
+            write_whole(&path, bytes)?;
             marker.push_str(&marker_line(&variable.name, bytes));
             marker.push('\n');
         }
-        write_whole(&self.marker(block.chunk), marker.as_bytes())?;
+        if !self.is_in_memory() {
+            write_whole(&self.marker(block.chunk), marker.as_bytes())?;
+        }
         self.finished[block.chunk].store(true, Ordering::Release);
         Ok(())
     }
@@ -353,6 +404,7 @@ impl Store {
         let path = self.file(variable, block);
         let bytes = match self.read_file(variable, block) {
             Ok(bytes) => bytes,
+            Err(error) if self.is_in_memory() => return Err(error.into()),
             Err(error) => {
                 // Another process may have joined the chunks.
                 let there = Self::open(&self.path)?;
@@ -443,7 +495,12 @@ impl Store {
     /// # Errors
     /// If the file system fails.
     pub fn write_beside(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
-        write_if_other(&self.path.join(name), bytes)
+        let path = self.path.join(name);
+        if let Some(mut files) = self.memory() {
+            files.insert(path, bytes.to_vec());
+            return Ok(());
+        }
+        write_if_other(&path, bytes)
     }
 
     /// Reads a document next to the arrays; `None` if it does not exist.
@@ -451,8 +508,7 @@ impl Store {
     /// # Errors
     /// If the file system fails.
     pub fn read_beside(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        let path = self.path.join(name);
-        match input::read(&path, MAX_TABLE_BYTES, Origin::File) {
+        match self.read(self.path.join(name), MAX_TABLE_BYTES) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.is_missing() => Ok(None),
             Err(error) => Err(error.into()),
@@ -467,6 +523,9 @@ impl Store {
     pub fn tidy(&self) -> Result<bool, StoreError> {
         if self.missing() > 0 {
             return Ok(false);
+        }
+        if self.is_in_memory() {
+            return Ok(true);
         }
         let arrays = self.schema.variables.iter().map(|v| v.name.as_str());
         let coordinates = self.schema.coordinates.iter().map(|c| c.name.as_str());

@@ -40,8 +40,8 @@ let found = null;             // the case of a fit
 let filled = "";              // the form that is shown
 let drawn = null;             // what the displayed figure is of, and where its clicks go
 let asking = null;            // the same of the figure that is being computed
-let pinned = 0;               // the number of the figure that is drawn behind
-let number = 0;               // the server's number for the figure
+let pinned = null;            // the figure that is drawn behind
+let shown = null;             // the displayed figure, as it was received
 let motion = null;            // the displayed motion
 let timer = 0;
 let gone = () => {};
@@ -174,7 +174,7 @@ export function begin(motionChanged, studies) {
     button.addEventListener("click", async () => {
       const format = button.dataset.studyExport;
       try {
-        save(await bytes("export", "/api/figure", { number, views: views(), format }), `${state.tab}.${format}`);
+        save(await bytes("export", "/api/figure", { figure: shown, views: views(), format }), `${state.tab}.${format}`);
       } catch (error) { if (!superseded(error)) $("progress").textContent = error.message; }
     });
   }
@@ -235,7 +235,7 @@ function forget() {
   asking = null;
   drawn = null;
   found = null;
-  number = 0;
+  shown = null;
   figure.clear($("study-figure"));
   $("tables").replaceChildren();
   $("study-export").hidden = true;
@@ -277,7 +277,7 @@ function build() {
   button("Stop", () => stop("study"));
   const pin = button(pinned ? "Unpin" : "Pin", () => {
     const before = pinned;
-    pinned = pinned || !drawn ? 0 : number;
+    pinned = pinned || !drawn ? null : shown;
     pin.textContent = pinned ? "Unpin" : "Pin";
     pin.setAttribute("aria-pressed", String(Boolean(pinned)));
     // Without its pinned curves the figure is drawn anew.
@@ -463,7 +463,7 @@ async function compute(quick, more = {}) {
   asking = own;
   let request = null;
   try {
-    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
+    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, quick, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
       // An answer for an older case is dropped.
       if (asking !== own) return;
       if (message.progress) { $("progress").textContent = message.progress; return; }
@@ -471,24 +471,24 @@ async function compute(quick, more = {}) {
       own.clicks = message.clicks;
       Object.assign(own, { case: own.case && caseOf(own, message.clicks) });
       drawn = own;
-      number = message.number ?? 0;
+      shown = message.figure ?? null;
       found = message.found ?? null;
       $("progress").textContent = message.words;
       $("study-command").textContent = message.command;
       $("study-python").textContent = message.python;
       $("study-export").hidden = false;
-      for (const button of document.querySelectorAll("[data-study-export]")) button.hidden = !number;
-      $("study-figure").hidden = !number;
+      for (const button of document.querySelectorAll("[data-study-export]")) button.hidden = !shown;
+      $("study-figure").hidden = !shown;
       show(message.tables);
       if (message.figure) figure.put($("study-figure"), message.figure);
       mark();
       scan();
-      if (quick) { $("progress").textContent = `${message.words}; “Compute” refines the curve and follows its branches`; request?.abort(); }
+      if (quick) $("progress").textContent = `${message.words}; “Compute” refines the curve and follows its branches`;
     });
     request = current("study");
     await sent;
   } catch (error) {
-    if (asking === own && !(quick && drawn === own)) $("progress").textContent = superseded(error) ? "stopped" : error.message;
+    if (asking === own) $("progress").textContent = superseded(error) ? "stopped" : error.message;
   }
   if (asking === own) asking = null;
 }

@@ -1,13 +1,12 @@
 //! Responses to requests that fail.
 
-use axum::Json;
-use axum::http::StatusCode;
-use axum::response::{IntoResponse, Response};
 use nanotap::case::CaseError;
 use nanotap::case::file::CaseFileError;
 use nanotap::error::ErrorPlace;
 use nanotap::{Error, ErrorKind};
 use serde_json::{Value, json};
+
+use crate::answers::Outcome;
 
 /// The reason of a failed request, with the terminal's message.
 #[derive(Clone, Debug)]
@@ -59,9 +58,13 @@ impl ApiError {
         self
     }
 
-    /// Whether the work was cancelled.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.error.kind == ErrorKind::Stopped
+    /// How the request ended.
+    pub(crate) const fn outcome(&self) -> Outcome {
+        match self.error.kind {
+            ErrorKind::BadInput | ErrorKind::Numerics => Outcome::Refused,
+            ErrorKind::Files => Outcome::Failed,
+            ErrorKind::Stopped => Outcome::Stopped,
+        }
     }
 
     /// The JSON that the page reads.
@@ -101,15 +104,5 @@ impl From<CaseError> for ApiError {
             CaseError::Stated(error) => (*error).into(),
             error @ (CaseError::Model(_) | CaseError::Tones(_)) => Self::of(error),
         }
-    }
-}
-
-impl IntoResponse for ApiError {
-    fn into_response(self) -> Response {
-        let status = match self.error.kind {
-            ErrorKind::BadInput | ErrorKind::Numerics => StatusCode::UNPROCESSABLE_ENTITY,
-            ErrorKind::Files | ErrorKind::Stopped => StatusCode::INTERNAL_SERVER_ERROR,
-        };
-        (status, Json(self.json())).into_response()
     }
 }

@@ -1,9 +1,5 @@
 //! All coexisting motions, each with a state that starts it.
 
-use std::sync::Arc;
-
-use axum::Json;
-use axum::extract::State;
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
@@ -14,7 +10,7 @@ use nanotap::study::registry::Study as _;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::App;
+use crate::Explorer;
 use crate::api_error::ApiError;
 use crate::motion_request::{Start, model_of};
 use crate::preset::CaseSpec;
@@ -32,18 +28,12 @@ pub(crate) struct Census {
     unstable: bool,
 }
 
-pub(crate) async fn attractors(
-    State(app): State<Arc<App>>,
-    Json(census): Json<Census>,
-) -> Result<Json<Value>, ApiError> {
-    let shared = Arc::clone(&app);
-    app.workers
-        .run_long(move |control| listed(&shared, &census, control))
-        .await
-        .map(Json)
-}
-
-fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, ApiError> {
+/// The motions that coexist.
+pub(crate) fn listed(
+    app: &Explorer,
+    census: &Census,
+    control: &Control<'_>,
+) -> Result<Value, ApiError> {
     let case = census.case.case(app, control)?;
     model_of(&case)?;
     let request = AttractorsOptions {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use nanotap::study::registry;
 use serde_json::{Map, Value};
 
-use crate::App;
+use crate::Explorer;
 use crate::api_error::ApiError;
 use crate::motion_request::{MotionRequest, Start};
 use crate::preset::CaseSpec;
@@ -15,7 +15,7 @@ pub(crate) const CASE_FILE: &str = "case.toml";
 
 /// The path of the case file in commands: the given file if nothing was changed, otherwise the
 /// saved one.
-pub(crate) fn case_path(app: &App, case: &CaseSpec) -> Result<String, ApiError> {
+pub(crate) fn case_path(app: &Explorer, case: &CaseSpec) -> Result<String, ApiError> {
     Ok(if case.is_a_file(app)? {
         case.preset(app)?.path.clone()
     } else {
@@ -24,7 +24,11 @@ pub(crate) fn case_path(app: &App, case: &CaseSpec) -> Result<String, ApiError> 
 }
 
 /// The command for the same motion.
-pub(crate) fn command(app: &App, request: &MotionRequest, study: &str) -> Result<String, ApiError> {
+pub(crate) fn command(
+    app: &Explorer,
+    request: &MotionRequest,
+    study: &str,
+) -> Result<String, ApiError> {
     let mut line = format!(
         "nanotap {study} {}",
         quoted(&case_path(app, &request.case)?)
@@ -43,7 +47,7 @@ pub(crate) fn command(app: &App, request: &MotionRequest, study: &str) -> Result
 
 /// The command of a study with its options.
 pub(crate) fn study_command(
-    app: &App,
+    app: &Explorer,
     case: &CaseSpec,
     name: &str,
     request: &Map<String, Value>,
@@ -106,7 +110,11 @@ pub(crate) fn quoted(word: &str) -> String {
 }
 
 /// The lines of Python for the same motion.
-pub(crate) fn python(app: &App, request: &MotionRequest, study: &str) -> Result<String, ApiError> {
+pub(crate) fn python(
+    app: &Explorer,
+    request: &MotionRequest,
+    study: &str,
+) -> Result<String, ApiError> {
     let path = case_path(app, &request.case)?;
     let start = Start::parse(&request.start)?;
     let mut options = String::new();
@@ -129,7 +137,7 @@ pub(crate) fn python(app: &App, request: &MotionRequest, study: &str) -> Result<
 
 /// The lines of Python for the same studies.
 pub(crate) fn study_python(
-    app: &App,
+    app: &Explorer,
     case: &CaseSpec,
     studies: &[(&str, &Map<String, Value>)],
 ) -> Result<String, ApiError> {

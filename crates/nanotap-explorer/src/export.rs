@@ -1,11 +1,7 @@
 //! Files to save: the case, the time series of the motion, its figures.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::PoisonError;
 
-use axum::Json;
-use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse as _, Response};
 use nanotap::case::Case;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
@@ -13,7 +9,7 @@ use nanotap::model::Model;
 use nanotap::observe::time_series;
 use serde::Deserialize;
 
-use crate::App;
+use crate::Explorer;
 use crate::api_error::ApiError;
 use crate::figures::{picture, viewed};
 use crate::motion::Motion;
@@ -34,28 +30,17 @@ pub(crate) struct Wish {
     format: String,
 }
 
-pub(crate) async fn export(
-    State(app): State<Arc<App>>,
-    Json(wish): Json<Wish>,
-) -> Result<Response, ApiError> {
-    let shared = Arc::clone(&app);
-    let (kind, bytes) = app
-        .workers
-        .run(move |control| exported(&shared, &wish, control))
-        .await?;
-    Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
-}
-
 /// The case file of what the page shows; empty before the first motion.
-pub(crate) async fn shown(State(app): State<Arc<App>>) -> Result<String, ApiError> {
+pub(crate) fn shown(app: &Explorer) -> Result<String, ApiError> {
     let shown = app.shown.lock().unwrap_or_else(PoisonError::into_inner);
-    let case = shown.as_ref().map(|case| case.any_distance(&app));
+    let case = shown.as_ref().map(|case| case.any_distance(app));
     let case = case.transpose()?;
     Ok(case.as_ref().map(Case::to_toml).unwrap_or_default())
 }
 
-fn exported(
-    app: &App,
+/// The file that is to be saved.
+pub(crate) fn exported(
+    app: &Explorer,
     wish: &Wish,
     control: &Control<'_>,
 ) -> Result<(&'static str, Vec<u8>), ApiError> {

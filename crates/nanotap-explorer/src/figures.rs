@@ -1,23 +1,15 @@
 //! Figures for the page, which draws their description, and as files.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::{Arc, Mutex, PoisonError};
 
-use axum::Json;
-use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse as _, Response};
 use nanotap_figures::{Axis, Colour, DPI, Figure, Layer, Range};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::App;
 use crate::api_error::ApiError;
 use crate::clicks::{conversion, parts};
 
-/// Number of figures of studies that are stored for redrawing.
-const KEPT: usize = 8;
 /// Steps of the colours of a map.
 const SHADES: usize = 64;
 
@@ -54,9 +46,9 @@ pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
 /// Legend of the curves of a pinned figure.
 const PINNED: &str = "pinned";
 
-/// The figure with the curves of a pinned one behind its own, in the panels with the same axes, and
-/// whether there is one.
-pub(crate) fn over_pinned(mut figure: Figure, pinned: &Figure) -> (Figure, bool) {
+/// Draws the curves of a pinned figure behind those of another, in the panels with the same axes.
+/// Returns whether there are any.
+pub(crate) fn over_pinned(figure: &mut Figure, pinned: &Figure) -> bool {
     let factor = |one: &Axis, other: &Axis| {
         let ((label, unit), (of, from)) = (parts(one), parts(other));
         (label == of).then(|| conversion(from, unit))?
@@ -92,7 +84,7 @@ pub(crate) fn over_pinned(mut figure: Figure, pinned: &Figure) -> (Figure, bool)
         behind.append(&mut panel.layers);
         panel.layers = behind;
     }
-    (figure, any)
+    any
 }
 
 /// The description of a figure, which the page draws.
@@ -217,68 +209,19 @@ fn field(word: &str) -> String {
     }
 }
 
-/// The most recent figures of studies.
-#[derive(Default)]
-pub(crate) struct Shelf(Mutex<Kept>);
-
-#[derive(Default)]
-struct Kept {
-    /// Number of the last one.
-    last: u64,
-    figures: VecDeque<(u64, Arc<Figure>)>,
-}
-
-impl Shelf {
-    /// Stores a figure and returns its number, which is valid while it is among the most recent.
-    pub(crate) fn put(&self, figure: Figure) -> u64 {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.last += 1;
-        let number = kept.last;
-        kept.figures.push_back((number, Arc::new(figure)));
-        if kept.figures.len() > KEPT {
-            kept.figures.pop_front();
-        }
-        number
-    }
-
-    /// The figure with this number, which then counts as recent.
-    pub(crate) fn get(&self, number: u64) -> Result<Arc<Figure>, ApiError> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = kept.figures.iter().position(|(own, _)| *own == number);
-        let found = place.and_then(|place| kept.figures.remove(place));
-        let Some((_, figure)) = found else {
-            return Err(ApiError::input(
-                "this figure is no longer available",
-                "compute the study again",
-            ));
-        };
-        kept.figures.push_back((number, Arc::clone(&figure)));
-        Ok(figure)
-    }
-}
-
-/// Request for a stored figure as a file, in a range.
+/// Request for a figure that the page has, as a file, in a range.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
-    number: u64,
+    figure: Figure,
     #[serde(default)]
     views: Vec<View>,
     format: String,
 }
 
-pub(crate) async fn figure(
-    State(app): State<Arc<App>>,
-    Json(wish): Json<Wish>,
-) -> Result<Response, ApiError> {
-    let figure = app.figures.get(wish.number)?;
-    app.workers
-        .run(move |_| {
-            let figure = viewed(Figure::clone(&figure), &wish.views);
-            let (kind, bytes) = picture(&figure, &wish.format)?;
-            Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
-        })
-        .await
+/// A figure of the page as a file.
+pub(crate) fn redrawn(wish: &Wish) -> Result<(&'static str, Vec<u8>), ApiError> {
+    picture(&viewed(wish.figure.clone(), &wish.views), &wish.format)
 }
 
 #[cfg(test)]
@@ -314,8 +257,8 @@ mod tests {
                 .with(Line::new([(1.0, y)]).label("curve"))
         };
         let drawn = |unit: &str, y: f64| Figure::new(1, 1).with(panel(unit, y));
-        let (twice, any) = over_pinned(drawn("nm", 3.0), &drawn("nm", 2.0));
-        assert!(any);
+        let mut twice = drawn("nm", 3.0);
+        assert!(over_pinned(&mut twice, &drawn("nm", 2.0)));
         let heights: Vec<(f64, &str)> = twice.panels[0]
             .layers
             .iter()
@@ -326,26 +269,16 @@ mod tests {
             .collect();
         assert_eq!(heights, [(2.0, PINNED), (3.0, "curve")]);
         // A pinned curve of a pinned figure is not drawn again.
-        let (third, _) = over_pinned(drawn("nm", 4.0), &twice);
+        let mut third = drawn("nm", 4.0);
+        over_pinned(&mut third, &twice);
         assert_eq!(third.panels[0].layers.len(), 2);
-        let (other, any) = over_pinned(drawn("um", 3.0), &drawn("nm", 2.0));
-        assert!(any);
+        let mut other = drawn("um", 3.0);
+        assert!(over_pinned(&mut other, &drawn("nm", 2.0)));
         assert!(
             matches!(&other.panels[0].layers[0], Layer::Line(line) if (line.points[0].0 - 1e-3).abs() < 1e-15)
         );
-        let (other, any) = over_pinned(drawn("Hz", 3.0), &drawn("nm", 2.0));
-        assert!(!any);
+        let mut other = drawn("Hz", 3.0);
+        assert!(!over_pinned(&mut other, &drawn("nm", 2.0)));
         assert_eq!(other.panels[0].layers.len(), 1);
-    }
-
-    #[test]
-    fn only_the_newest_figures_are_kept() {
-        let shelf = Shelf::default();
-        let first = shelf.put(Figure::new(1, 1));
-        assert!(shelf.get(first).is_ok());
-        for _ in 0..KEPT {
-            shelf.put(Figure::new(1, 1));
-        }
-        assert!(shelf.get(first).is_err());
     }
 }

@@ -1,14 +1,10 @@
 //! Another contact law: what must be left away with it, and what it needs in addition.
 
-use std::sync::Arc;
-
-use axum::Json;
-use axum::extract::State;
 use nanotap::case::{Key, Value as Written};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use crate::App;
+use crate::Explorer;
 use crate::api_error::ApiError;
 use crate::preset::CaseSpec;
 
@@ -20,19 +16,8 @@ pub(crate) struct LawRequest {
     law: String,
 }
 
-pub(crate) async fn law(
-    State(app): State<Arc<App>>,
-    Json(request): Json<LawRequest>,
-) -> Result<Json<Value>, ApiError> {
-    let shared = Arc::clone(&app);
-    app.workers
-        .run(move |_| changes(&shared, &request))
-        .await
-        .map(Json)
-}
-
 /// The keys to set, empty where the law does not take them, and a sentence that says which.
-fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
+pub(crate) fn changes(app: &Explorer, request: &LawRequest) -> Result<Value, ApiError> {
     let case = request.case.any_distance(app)?;
     let key = if case.is_physical() {
         Key::SampleLaw
@@ -40,7 +25,7 @@ fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
         Key::Contact
     };
     let about = |error: nanotap::Error| ApiError::of(error).about(key.path());
-    let preset = request.case.preset(app)?.clone();
+    let preset = request.case.preset(app)?;
     let base = nanotap::case::Case::parse(Some(preset.source()), &preset.set)?;
     let change = case.law_change(&request.law, &base).map_err(about)?;
     let mut set = Map::new();

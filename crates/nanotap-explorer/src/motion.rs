@@ -2,8 +2,6 @@
 
 use std::sync::{Arc, PoisonError};
 
-use axum::Json;
-use axum::extract::State;
 use nanotap::ErrorKind;
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
@@ -27,7 +25,7 @@ use crate::figures::drawn;
 use crate::film::film;
 use crate::motion_request::{MotionRequest, Start, model_of};
 use crate::readout::readout;
-use crate::{App, commands, forms, knobs};
+use crate::{Explorer, commands, forms, knobs};
 
 /// Largest number of drive periods in the film and the figures of a motion without a period.
 const LONGEST: usize = 16;
@@ -128,18 +126,12 @@ impl Motion {
     }
 }
 
-pub(crate) async fn motion(
-    State(app): State<Arc<App>>,
-    Json(request): Json<MotionRequest>,
-) -> Result<Json<Value>, ApiError> {
-    let shared = Arc::clone(&app);
-    app.workers
-        .run(move |control| answer(&shared, &request, control))
-        .await
-        .map(Json)
-}
-
-fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<Value, ApiError> {
+/// The motion of a request and all that the page shows of it.
+pub(crate) fn answer(
+    app: &Explorer,
+    request: &MotionRequest,
+    control: &Control<'_>,
+) -> Result<Value, ApiError> {
     let (case, base) = (
         request.case.case(app, control)?,
         request.case.base(app, control)?,

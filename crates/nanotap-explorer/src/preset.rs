@@ -1,19 +1,17 @@
 //! The cases that the page offers: the given one, the paper's, the worked ones.
 
-use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, PoisonError};
 
-use axum::Json;
-use axum::extract::State;
-use nanotap::case::file::{self, Source};
+use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::study::setpoint::at_setpoint;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::App;
+use crate::Explorer;
 use crate::api_error::{ApiError, key_of};
+use crate::commands::CASE_FILE;
 use crate::forms;
 
 /// A case to start from.
@@ -30,7 +28,21 @@ pub(crate) struct Preset {
     pub(crate) solved: OnceLock<Case>,
 }
 
+/// Name of a case that is given.
+const FILE: &str = "file";
+
 impl Preset {
+    fn of(name: &str, source: Source, set: Vec<String>) -> Self {
+        Self {
+            name: name.into(),
+            words: source.name,
+            text: source.text,
+            set,
+            path: String::new(),
+            solved: OnceLock::new(),
+        }
+    }
+
     pub(crate) fn source(&self) -> Source {
         Source {
             name: self.words.clone(),
@@ -127,29 +139,25 @@ const BUILT_IN: [(&str, &str, &str, &[&str]); 14] = [
     ),
 ];
 
-/// Every preset; the case file at `path` comes first.
-pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, nanotap::Error> {
+/// Every preset; the given case, with its changes, comes first.
+pub(crate) fn all(
+    given: Option<(Source, Vec<String>)>,
+) -> Result<Vec<Arc<Preset>>, nanotap::Error> {
     let mut presets = Vec::new();
-    if let Some(path) = path {
-        let source = file::read(path)?;
-        let set = file::with_tables(set)?;
+    if let Some((source, set)) = given {
         Case::parse(Some(source.clone()), &set)?;
-        presets.push(Preset {
-            name: "file".into(),
-            words: source.name.clone(),
-            path: source.name,
-            text: source.text,
-            set,
-            solved: OnceLock::new(),
-        });
+        presets.push(Arc::new(Preset {
+            path: source.name.clone(),
+            ..Preset::of(FILE, source, set)
+        }));
     }
-    presets.extend(BUILT_IN.iter().map(|(name, words, text, set)| Preset {
-        name: (*name).into(),
-        words: (*words).into(),
-        text: (*text).into(),
-        set: set.iter().map(|word| (*word).to_owned()).collect(),
-        path: String::new(),
-        solved: OnceLock::new(),
+    presets.extend(BUILT_IN.iter().map(|(name, words, text, set)| {
+        let source = Source {
+            name: (*words).into(),
+            text: (*text).into(),
+        };
+        let set = set.iter().map(|word| (*word).to_owned()).collect();
+        Arc::new(Preset::of(name, source, set))
     }));
     Ok(presets)
 }
@@ -158,16 +166,36 @@ pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, na
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CaseSpec {
+    #[serde(default)]
     preset: String,
+    /// The text of a case file, in place of a preset.
+    #[serde(default)]
+    text: Option<String>,
     #[serde(default)]
     set: Vec<String>,
 }
 
 impl CaseSpec {
-    pub(crate) fn preset<'a>(&self, app: &'a App) -> Result<&'a Preset, ApiError> {
+    pub(crate) fn preset(&self, app: &Explorer) -> Result<Arc<Preset>, ApiError> {
+        if let Some(text) = &self.text {
+            // The most recent one is kept: its setpoint may have been solved for.
+            let mut given = app.given.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(preset) = given.as_ref().filter(|preset| preset.text == *text) {
+                return Ok(Arc::clone(preset));
+            }
+            let source = Source {
+                name: CASE_FILE.into(),
+                text: text.clone(),
+            };
+            Case::parse(Some(source.clone()), &[])?;
+            let preset = Arc::new(Preset::of(FILE, source, Vec::new()));
+            *given = Some(Arc::clone(&preset));
+            return Ok(preset);
+        }
         app.presets
             .iter()
             .find(|preset| preset.name == self.preset)
+            .cloned()
             .ok_or_else(|| {
                 let known: Vec<&str> = app.presets.iter().map(|p| p.name.as_str()).collect();
                 ApiError::input(
@@ -178,9 +206,9 @@ impl CaseSpec {
     }
 
     /// Whether it is the given file, without changes.
-    pub(crate) fn is_a_file(&self, app: &App) -> Result<bool, ApiError> {
+    pub(crate) fn is_a_file(&self, app: &Explorer) -> Result<bool, ApiError> {
         let preset = self.preset(app)?;
-        Ok(!preset.path.is_empty() && self.words(preset).is_empty())
+        Ok(!preset.path.is_empty() && self.words(&preset).is_empty())
     }
 
     /// The changes to the preset's text, each key once.
@@ -200,9 +228,9 @@ impl CaseSpec {
     }
 
     /// The case, checked as at the terminal, without solving for the distance of a setpoint.
-    pub(crate) fn any_distance(&self, app: &App) -> Result<Case, ApiError> {
+    pub(crate) fn any_distance(&self, app: &Explorer) -> Result<Case, ApiError> {
         let preset = self.preset(app)?;
-        let case = Case::parse(Some(preset.source()), &self.words(preset))?;
+        let case = Case::parse(Some(preset.source()), &self.words(&preset))?;
         let changes: Vec<String> = self.set.iter().map(|word| changed(word)).collect();
         Ok(if changes.is_empty() {
             case.called(&preset.words)
@@ -212,11 +240,11 @@ impl CaseSpec {
     }
 
     /// The case at its setpoint; its motions end once `control` cancels the work.
-    pub(crate) fn case(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
+    pub(crate) fn case(&self, app: &Explorer, control: &Control<'_>) -> Result<Case, ApiError> {
         Ok(self.at_setpoint(app, control)?.cancelled_by(control))
     }
 
-    fn at_setpoint(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
+    fn at_setpoint(&self, app: &Explorer, control: &Control<'_>) -> Result<Case, ApiError> {
         let solved = at_setpoint(self.any_distance(app)?, control);
         let about = |error: nanotap::Error| ApiError::of(error).about(Key::DriveSetpoint.path());
         Ok(solved.map_err(about)?.0)
@@ -231,24 +259,25 @@ impl CaseSpec {
     }
 
     /// The case with one more change, if it has a model.
-    pub(crate) fn with_word(&self, app: &App, word: String) -> Option<Case> {
+    pub(crate) fn with_word(&self, app: &Explorer, word: String) -> Option<Case> {
         let preset = self.preset(app).ok()?;
         let mut changed = self.clone();
         changed.set.retain(|other| key_of(other) != key_of(&word));
         changed.set.push(word);
-        let case = Case::parse(Some(preset.source()), &changed.words(preset)).ok()?;
+        let case = Case::parse(Some(preset.source()), &changed.words(&preset)).ok()?;
         case.model().is_ok().then_some(case)
     }
 
     /// The case of the preset, without changes; its motions end once `control` cancels the work.
-    pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
-        let solved = &self.preset(app)?.solved;
+    pub(crate) fn base(&self, app: &Explorer, control: &Control<'_>) -> Result<Case, ApiError> {
+        let preset = self.preset(app)?;
+        let solved = &preset.solved;
         if let Some(case) = solved.get() {
             return Ok(case.cancelled_by(control));
         }
         let unchanged = Self {
-            preset: self.preset.clone(),
             set: Vec::new(),
+            ..self.clone()
         };
         // Other requests share it: it does not carry what cancels this one.
         let case = unchanged.at_setpoint(app, control)?;
@@ -268,14 +297,14 @@ fn changed(word: &str) -> String {
 }
 
 /// The data with which the page starts.
-pub(crate) async fn about(State(app): State<Arc<App>>) -> Json<Value> {
+pub(crate) fn about(app: &Explorer) -> Value {
     let presets: Vec<Value> = app
         .presets
         .iter()
         .map(|preset| {
             let physical = preset.text.contains("[cantilever]");
             let group = match preset.name.as_str() {
-                "file" => "Your case",
+                FILE => "Your case",
                 _ if physical => "Levers",
                 _ => "Numbers of the equations",
             };
@@ -283,7 +312,7 @@ pub(crate) async fn about(State(app): State<Arc<App>>) -> Json<Value> {
         })
         .collect();
     let studies: Vec<Value> = forms::plain_studies().map(forms::plain).collect();
-    Json(json!({ "version": env!("CARGO_PKG_VERSION"), "presets": presets, "studies": studies }))
+    json!({ "version": env!("CARGO_PKG_VERSION"), "presets": presets, "studies": studies })
 }
 
 #[cfg(test)]
@@ -292,7 +321,7 @@ mod tests {
 
     #[test]
     fn every_preset_is_read_and_its_case_file_is_the_same_case() {
-        let presets = all(None, &[]).unwrap();
+        let presets = all(None).unwrap();
         assert_eq!(presets.len(), BUILT_IN.len());
         for preset in presets {
             let case = Case::parse(Some(preset.source()), &preset.set).unwrap();

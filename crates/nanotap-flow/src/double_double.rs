@@ -4,6 +4,7 @@
 //! Error-free sums and products after Dekker and Knuth.
 
 use crate::Complex;
+use crate::simd::fused;
 
 /// A sum of two doubles, the second below the rounding of the first.
 #[derive(Clone, Copy)]
@@ -27,7 +28,7 @@ impl Dd {
     /// Returns the exact product of two doubles.
     pub(crate) fn two_product(a: f64, b: f64) -> Self {
         let p = a * b;
-        Self(p, a.mul_add(b, -p))
+        Self(p, fused(a, b, -p))
     }
 
     pub(crate) fn add(self, other: Self) -> Self {
@@ -90,7 +91,7 @@ impl ComplexDd {
         for n in 2..18 {
             let n = f64::from(n);
             // 1/n in twice double precision: one Newton correction.
-            let inverse = Dd::two_sum(1.0 / n, (1.0 / n).mul_add(-n, 1.0) / n);
+            let inverse = Dd::two_sum(1.0 / n, fused(1.0 / n, -n, 1.0) / n);
             let inverse = Self(inverse, Dd::ZERO);
             term = term.multiply(z).multiply(inverse);
             sum = sum.add(term);

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use nanotap_explorer::{Options, serve};
+use nanotap_server::{Options, serve};
 
 use crate::failure::Failure;
 use crate::output::Output;

@@ -9,12 +9,9 @@ mod measured;
 mod plan;
 mod registered;
 
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
-use axum::Json;
-use axum::extract::State;
-use axum::response::Response;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use nanotap::case::Case;
@@ -24,21 +21,23 @@ use nanotap::model::Model;
 use nanotap::study::registry::{DatasetPlan, Study, StudyEntry, study as study_named};
 use nanotap::study::request::{Property, properties, read};
 use nanotap::study::sweep::Over;
+use nanotap_arithmetic::clock::Instant;
 use nanotap_figures::Figure;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use crate::App;
+use crate::Explorer;
 use crate::api_error::ApiError;
 use crate::commands::{CASE_FILE, case_path, quoted, study_command, study_python};
 use crate::figures::{drawn, over_pinned};
 use crate::forms;
 use crate::motion_request::model_of;
 use crate::preset::CaseSpec;
-use crate::scratch::Scratch;
 
 /// Time between messages on the progress.
 const BETWEEN: Duration = Duration::from_millis(300);
+/// Most bytes of a dataset, before they are compressed.
+const LARGEST_DATASET: usize = 1 << 30;
 
 /// A study as requested by the page: its fields by name.
 #[derive(Clone, Debug, Deserialize)]
@@ -53,9 +52,12 @@ pub(crate) struct StudyRequest {
     #[serde(default)]
     data: Option<(String, Content)>,
     options: Map<String, Value>,
-    /// Number of a figure whose curves are drawn behind this one; 0: none.
+    /// A figure whose curves are drawn behind this one.
     #[serde(default)]
-    pinned: u64,
+    pinned: Option<Box<Figure>>,
+    /// Whether the first stage is enough.
+    #[serde(default)]
+    quick: bool,
 }
 
 /// The content of a measured file: a text, or the bytes of any file in base64.
@@ -77,20 +79,20 @@ impl Content {
     }
 }
 
-pub(crate) async fn study(
-    State(app): State<Arc<App>>,
-    Json(request): Json<StudyRequest>,
-) -> Response {
-    let shared = Arc::clone(&app);
-    app.workers.stream(move |control, hand_over| {
-        Studied {
-            app: &shared,
-            request: &request,
-            control,
-            hand_over,
-        }
-        .run()
-    })
+/// Computes a study, and sends its stages to the page as they come.
+pub(crate) fn study(
+    app: &Explorer,
+    request: &StudyRequest,
+    control: &Control<'_>,
+    hand_over: HandOver<'_>,
+) -> Result<(), ApiError> {
+    Studied {
+        app,
+        request,
+        control,
+        hand_over,
+    }
+    .run()
 }
 
 /// Sends a message to the page.
@@ -98,7 +100,7 @@ type HandOver<'a> = &'a (dyn Fn(Value) + Sync);
 
 /// A study that is running, with its request and its connection to the page.
 struct Studied<'a> {
-    app: &'a App,
+    app: &'a Explorer,
     request: &'a StudyRequest,
     control: &'a Control<'a>,
     hand_over: HandOver<'a>,
@@ -210,13 +212,10 @@ impl Studied<'_> {
         let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
         let mut words = stage.words;
         let mut figure = stage.figure;
-        if let (Some(own), 1..) = (&figure, self.request.pinned) {
-            let pinned = self.app.figures.get(self.request.pinned)?;
-            let (both, any) = over_pinned(own.clone(), &pinned);
-            if !any {
-                words.push_str("; the pinned figure has other axes");
-            }
-            figure = Some(both);
+        if let (Some(own), Some(pinned)) = (&mut figure, &self.request.pinned)
+            && !over_pinned(own, pinned)
+        {
+            words.push_str("; the pinned figure has other axes");
         }
         let mut message = json!({
             "clicks": stage.clicks,
@@ -233,7 +232,6 @@ impl Studied<'_> {
         });
         if let Some(figure) = figure {
             message["figure"] = drawn(&figure)?;
-            message["number"] = self.app.figures.put(figure).into();
         }
         if let Some(found) = stage.found {
             message["found"] = json!(found);
@@ -242,17 +240,21 @@ impl Studied<'_> {
         Ok(())
     }
 
-    /// A dataset of a study, in a folder that is removed once the figure is drawn.
+    /// A dataset of a study, in memory.
     fn dataset<T>(
         &self,
         plan: &DatasetPlan,
         control: &Control<'_>,
         use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
     ) -> Result<T, ApiError> {
-        let scratch = Scratch::within(&self.app.scratch)?;
-        let store =
-            Store::create_or_resume(&scratch.path().join("data.zarr"), plan.schema().clone())
-                .map_err(ApiError::of)?;
+        let schema = plan.schema();
+        if schema.bytes().is_none_or(|bytes| bytes > LARGEST_DATASET) {
+            return Err(ApiError::input(
+                "the results would fill the memory",
+                "fewer values, or compute them at the terminal with --out",
+            ));
+        }
+        let store = Store::in_memory(schema.clone());
         let work = Work {
             share: Share::WHOLE,
             threads: 0,
@@ -287,7 +289,7 @@ impl Studied<'_> {
         let finest = counts.last().copied().unwrap_or_default();
         for &count in counts {
             stage(count, finest)?;
-            if self.control.is_cancelled() {
+            if self.request.quick || self.control.is_cancelled() {
                 break;
             }
         }

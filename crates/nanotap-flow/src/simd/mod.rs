@@ -41,6 +41,8 @@ mod single;
 #[cfg(test)]
 mod tests;
 mod twice;
+#[cfg(all(target_family = "wasm", target_feature = "relaxed-simd"))]
+mod wasm;
 
 pub(crate) use functions::{
     LARGEST_ANGLE, SMALL_ANGLE, complex_mul, exp, exp_complex, exp_small, sin_cos, sum, sums,
@@ -48,6 +50,21 @@ pub(crate) use functions::{
 pub(crate) use plain::{Library, Plain};
 pub(crate) use single::Single;
 pub(crate) use twice::Twice;
+
+/// The arithmetic where no other is found at run time.
+#[cfg(all(target_family = "wasm", target_feature = "relaxed-simd"))]
+type Portable = wasm::Wasm;
+#[cfg(not(all(target_family = "wasm", target_feature = "relaxed-simd")))]
+type Portable = Plain;
+
+/// `a b + c`, rounded once.
+#[inline(always)]
+pub(crate) fn fused(a: f64, b: f64, c: f64) -> f64 {
+    #[cfg(all(target_family = "wasm", target_feature = "relaxed-simd"))]
+    return wasm::fused_numbers(a, b, c);
+    #[cfg(not(all(target_family = "wasm", target_feature = "relaxed-simd")))]
+    a.mul_add(b, c)
+}
 
 /// Numbers in a vector.
 pub(crate) const WIDTH: usize = 4;
@@ -176,7 +193,7 @@ pub(crate) fn dispatch<W: Work>(work: W) -> W::Output {
         // SAFETY: the machine has these instructions.
         return unsafe { avx2::run(work) };
     }
-    work.run::<Plain>()
+    work.run::<Portable>()
 }
 
 /// The same for eight motions in a batch.
@@ -189,7 +206,7 @@ pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
         (false, true) => return unsafe { avx2::run_wide(work) },
         (_, false) => {}
     }
-    work.run::<Twice<Plain>>()
+    work.run::<Twice<Portable>>()
 }
 
 /// See [`crate::vector_instructions`].
@@ -200,7 +217,9 @@ pub(crate) fn vector_instructions() -> &'static str {
         (false, true) => "AVX2",
         (_, false) => "without AVX2: piecewise-linear cases take several times as long",
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(target_family = "wasm")]
+    return "WebAssembly";
+    #[cfg(not(any(target_arch = "x86_64", target_family = "wasm")))]
     "portable"
 }
 

@@ -114,7 +114,7 @@ fn run_apart<S: Simd, W: Work>(work: W) -> W::Output {
 
 impl Lanes for Plain {
     // Rounded once, as vector registers do it: by the processor, or in software.
-    arrays!(f64::mul_add);
+    arrays!(super::fused);
 }
 
 impl Simd for Plain {

@@ -8,7 +8,6 @@
 //! with the verdict of the exact flow on the same motion.
 
 use std::collections::VecDeque;
-use std::time::Instant;
 
 use nanotap_dynamics::classify;
 use nanotap_flow::fixed_step::FixedStep;
@@ -20,6 +19,7 @@ use crate::simulate::{
     Classification, Grid, Named, SimulateOptions, check_periods, check_states, is_none,
     starting_state,
 };
+use nanotap_arithmetic::clock::Instant;
 use nanotap_case::units::Units;
 use nanotap_error::Error;
 use nanotap_model::model_map::ModelMap;

@@ -2,8 +2,6 @@
 
 pub mod fixed_step;
 
-use std::time::Instant;
-
 pub use nanotap_dynamics::ClassifyOptions;
 use nanotap_dynamics::{
     LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, Torus, classify,
@@ -14,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::figure::motion::{fixed_step_figure, simulation_figure};
 use crate::initial_state::initial_state_note;
 use fixed_step::{FixedStepRun, fixed_step_run};
+use nanotap_arithmetic::clock::Instant;
 use nanotap_case::Case;
 use nanotap_case::state::WrittenState;
 use nanotap_case::units::Units;

@@ -51,7 +51,7 @@ pub(crate) async fn listen(listener: &TcpListener, router: Router) {
 pub(crate) async fn whole(request: Request, next: Next) -> Response {
     let (head, body) = request.into_parts();
     let longest = match head.uri.path() {
-        "/api/study" => crate::LONGEST_DATA,
+        "/api/study" | "/api/figure" => crate::LONGEST_DATA,
         _ => crate::LONGEST_REQUEST,
     };
     let read = axum::body::to_bytes(body, longest);

@@ -5,15 +5,15 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use axum::Json;
 use axum::body::Body;
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use nanotap::control::{CancelFlag, Control};
-use serde_json::Value;
+use nanotap_explorer::{Answer, Outcome};
+use serde_json::{Value, json};
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
-
-use crate::api_error::ApiError;
 
 /// Number of motions computed at once: a newer one stops the oldest.
 const MOTIONS: usize = 6;
@@ -71,11 +71,11 @@ fn control(stop: &CancelFlag) -> Control<'_> {
 }
 
 impl Workers {
-    /// Runs `work` that follows a slider, and waits for its result.
-    pub(crate) async fn run<T: Send + 'static>(
+    /// Answers a request that follows a slider.
+    pub(crate) async fn short(
         &self,
-        work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
-    ) -> Result<T, ApiError> {
+        work: impl FnOnce(&Control<'_>) -> Answer + Send + 'static,
+    ) -> Response {
         let own = Arc::new(CancelFlag::new());
         {
             let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
@@ -87,28 +87,27 @@ impl Workers {
             }
         }
         let _done = Done(Arc::clone(&self.running), Arc::clone(&own));
-        let answer = Self::run_in(&self.motions, (*own).clone(), work).await;
-        match answer {
-            Err(error) if error.is_stopped() => Err(ApiError::failed(format!(
+        match Self::run_in(&self.motions, (*own).clone(), work).await {
+            Ok(answer) if answer.outcome == Outcome::Stopped => failed(format!(
                 "stopped: {MOTIONS} newer motions were requested, from other pages perhaps"
-            ))),
-            answer => answer,
+            )),
+            answer => response(answer),
         }
     }
 
-    /// Runs `work` that may take long, within the limit of the studies.
-    pub(crate) async fn run_long<T: Send + 'static>(
+    /// Answers a request that may take long, within the limit of the studies.
+    pub(crate) async fn long(
         &self,
-        work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
-    ) -> Result<T, ApiError> {
-        Self::run_in(&self.studies, CancelFlag::new(), work).await
+        work: impl FnOnce(&Control<'_>) -> Answer + Send + 'static,
+    ) -> Response {
+        response(Self::run_in(&self.studies, CancelFlag::new(), work).await)
     }
 
-    async fn run_in<T: Send + 'static>(
+    async fn run_in(
         places: &Arc<Semaphore>,
         stop: CancelFlag,
-        work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
-    ) -> Result<T, ApiError> {
+        work: impl FnOnce(&Control<'_>) -> Answer + Send + 'static,
+    ) -> Result<Answer, String> {
         let place = Arc::clone(places).acquire_owned().await;
         let _guard = StopOnDrop(stop.clone());
         let task = tokio::task::spawn_blocking(move || {
@@ -116,18 +115,16 @@ impl Workers {
             work(&control(&stop))
         });
         match tokio::time::timeout(LONGEST, task).await {
-            Ok(Ok(done)) => done,
-            Ok(Err(_)) => Err(ApiError::failed("internal error; please report")),
+            Ok(Ok(answer)) => Ok(answer),
+            Ok(Err(_)) => Err("internal error; please report".to_owned()),
             Err(_) => Err(too_long()),
         }
     }
 
-    /// Runs `work` and sends its results as lines of JSON as they come.
-    pub(crate) fn stream(
+    /// Sends the lines of an answer as they come.
+    pub(crate) fn lines(
         &self,
-        work: impl FnOnce(&Control<'_>, &(dyn Fn(Value) + Sync)) -> Result<(), ApiError>
-        + Send
-        + 'static,
+        work: impl FnOnce(&Control<'_>, &(dyn Fn(Value) + Sync)) -> Answer + Send + 'static,
     ) -> Response {
         let places = Arc::clone(&self.studies);
         let (sender, receiver) = mpsc::channel::<Result<String, std::convert::Infallible>>(WAITING);
@@ -141,21 +138,19 @@ impl Workers {
             let guard = StopOnDrop(stop.clone());
             let task = tokio::task::spawn_blocking(move || {
                 let _place = place;
-                let hand_over = |value: Value| {
+                let line = |value: Value| {
                     // A client that disconnects, or does not read, stops the computation.
                     if sender.try_send(Ok(format!("{value}\n"))).is_err() {
                         stop.cancel();
                     }
                 };
-                if let Err(refusal) = work(&control(&stop), &hand_over) {
-                    hand_over(refusal.json());
-                }
+                work(&control(&stop), &line);
             });
             tokio::select! {
                 _ = task => {}
                 () = gone.closed() => {}
                 () = tokio::time::sleep(LONGEST) => {
-                    let _ = gone.try_send(Ok(format!("{}\n", too_long().json())));
+                    let _ = gone.try_send(Ok(format!("{}\n", refusal(&too_long()))));
                 }
             }
             drop(guard);
@@ -168,6 +163,30 @@ impl Workers {
     }
 }
 
-fn too_long() -> ApiError {
-    ApiError::failed(format!("stopped after {} s", LONGEST.as_secs()))
+/// The response of an answer.
+fn response(answer: Result<Answer, String>) -> Response {
+    let answer = match answer {
+        Ok(answer) => answer,
+        Err(words) => return failed(words),
+    };
+    let status = match answer.outcome {
+        Outcome::Answered => StatusCode::OK,
+        Outcome::Refused => StatusCode::UNPROCESSABLE_ENTITY,
+        Outcome::Unknown => StatusCode::NOT_FOUND,
+        Outcome::Stopped | Outcome::Failed => StatusCode::INTERNAL_SERVER_ERROR,
+    };
+    (status, [(header::CONTENT_TYPE, answer.kind)], answer.bytes).into_response()
+}
+
+/// The response to a request that was right, but was not answered.
+fn failed(words: String) -> Response {
+    (StatusCode::UNPROCESSABLE_ENTITY, Json(refusal(&words))).into_response()
+}
+
+fn refusal(words: &str) -> Value {
+    json!({ "error": words, "keys": [] })
+}
+
+fn too_long() -> String {
+    format!("stopped after {} s", LONGEST.as_secs())
 }

@@ -13,7 +13,7 @@ use axum::response::{IntoResponse as _, Response};
 
 use nanotap::Error;
 
-use crate::App;
+use crate::Server;
 
 /// The header that carries the token.
 pub(crate) const TOKEN_HEADER: &str = "x-nanotap-token";
@@ -35,7 +35,11 @@ pub(crate) fn new_token() -> Result<String, Error> {
 }
 
 /// Accepts a request or refuses it with a reason; adds the security headers.
-pub(crate) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+pub(crate) async fn guard(
+    State(app): State<Arc<Server>>,
+    request: Request,
+    next: Next,
+) -> Response {
     let mut response = match refusal(&app, &request) {
         Some((status, words)) => (status, words).into_response(),
         None => next.run(request).await,
@@ -52,7 +56,7 @@ pub(crate) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
     response
 }
 
-fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
+fn refusal(app: &Server, request: &Request) -> Option<(StatusCode, &'static str)> {
     let headers = request.headers();
     let own = [
         format!("127.0.0.1:{}", app.port),

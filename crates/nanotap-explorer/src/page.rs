@@ -1,0 +1,37 @@
+//! The files of the page.
+
+/// A file of the page.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Its name.
+    pub name: &'static str,
+    /// Its media type.
+    pub kind: &'static str,
+    /// Its content.
+    pub text: &'static str,
+}
+
+const STYLE: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+macro_rules! parts {
+    ($($kind:ident $name:literal),+ $(,)?) => {
+        [$(Part { name: $name, kind: $kind, text: include_str!(concat!("../page/", $name)) }),+]
+    };
+}
+
+/// The page itself.
+pub const INDEX: &str = include_str!("../page/index.html");
+
+/// What the page loads.
+pub const PARTS: [Part; 9] = parts![
+    STYLE "style.css",
+    SCRIPT "main.js",
+    SCRIPT "state.js",
+    SCRIPT "api.js",
+    SCRIPT "knobs.js",
+    SCRIPT "lever.js",
+    SCRIPT "study.js",
+    SCRIPT "figure.js",
+    SCRIPT "plot.js",
+];

@@ -1,7 +1,10 @@
-//! The site of the documents: prepared by `nanotap-book`, built by mdBook into `target/book/site`.
+//! The site: the page that needs no server, and the documents, prepared by `nanotap-book` and built by
+//! mdBook, in its folder `docs`.
 
 use std::fs;
+use std::path::Path;
 
+use crate::page;
 use crate::process::must;
 use crate::tally::Tally;
 use crate::tools::Workspace;
@@ -32,6 +35,27 @@ pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<Tally, St
     for command in [&mut lay_out, mdbook.arg("build").arg(&folder)] {
         must(&workspace.root, command, "the site could not be built")?;
     }
-    println!("{}", folder.join("site").join("index.html").display());
-    Ok(Tally::check(true))
+    let site = folder.join("site");
+    let mut tally = Tally::check(true);
+    match page::written(workspace)? {
+        Some(page) => front(&page, &site)?,
+        None => tally += page::SKIPPED,
+    }
+    println!("{}", site.join("docs").join("index.html").display());
+    Ok(tally)
+}
+
+/// The front page of the site is the page itself, with one sentence above it.
+fn front(page: &Path, site: &Path) -> Result<(), String> {
+    const BODY: &str = "<body>\n";
+    const SENTENCE: &str = "<p class=\"front\">nanotap computes every motion that a tapping lever can have at \
+        your settings, and what you would measure. <a href=\"docs/index.html\">Documents and \
+        installation</a></p>\n";
+    let failed = |error: std::io::Error| format!("cannot copy the page: {error}");
+    for file in fs::read_dir(page).map_err(failed)?.flatten() {
+        fs::copy(file.path(), site.join(file.file_name())).map_err(failed)?;
+    }
+    let index = site.join("index.html");
+    let text = fs::read_to_string(&index).map_err(failed)?;
+    fs::write(&index, text.replacen(BODY, &format!("{BODY}{SENTENCE}"), 1)).map_err(failed)
 }

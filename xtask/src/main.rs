@@ -14,6 +14,7 @@ mod book;
 mod dist;
 mod figures;
 mod package;
+mod page;
 mod peers;
 mod process;
 mod steps;

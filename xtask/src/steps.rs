@@ -5,7 +5,7 @@ use std::process::Command;
 use crate::process::{check, must, tests};
 use crate::tally::Tally;
 use crate::tools::{PYTHON, Workspace};
-use crate::{benches, book, dist, figures, package, peers, wheel};
+use crate::{benches, book, dist, figures, package, page, peers, wheel};
 
 /// A task of `cargo xtask`.
 pub(crate) struct Step {
@@ -53,6 +53,12 @@ pub(crate) static STEPS: &[Step] = &[
         about: "the Rust tests",
         takes_options: false,
         run: |workspace, _| test_rust(workspace),
+    },
+    Step {
+        name: "page",
+        about: "the page that needs no server, in target/page: its answers are the program's, byte for byte",
+        takes_options: false,
+        run: |workspace, _| page::run(workspace),
     },
     Step {
         name: "test-python",

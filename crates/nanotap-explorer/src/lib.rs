@@ -38,6 +38,7 @@ mod film;
 mod forms;
 mod knobs;
 mod law;
+pub mod link;
 mod maps;
 mod motion;
 mod motion_request;

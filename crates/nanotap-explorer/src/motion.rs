@@ -1,6 +1,6 @@
 //! One motion: its figures, its film, its observables, and equivalent commands.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::PoisonError;
 
 use nanotap::ErrorKind;
 use nanotap::case::quantity::Kind;

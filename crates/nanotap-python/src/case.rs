@@ -417,6 +417,12 @@ pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
     Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
 }
 
+/// A link that holds the text of a case file, to the published page or to another copy of it.
+#[pyfunction]
+pub(crate) fn link(case: &str, page: Option<&str>) -> String {
+    nanotap_explorer::link::link(page.unwrap_or(nanotap_explorer::link::PAGE), case)
+}
+
 /// Title of the axis of a key, given by its path and symbol; the path itself if it is not a key.
 #[pyfunction]
 pub(crate) fn label(path: &str, symbol: &str) -> String {

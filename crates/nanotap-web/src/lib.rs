@@ -4,6 +4,8 @@
 //! receives it, line by line or whole, through the functions that the module imports. A worker that is no
 //! longer needed is ended from outside: nothing here polls for that.
 
+#![cfg(target_family = "wasm")]
+
 use std::sync::LazyLock;
 
 use nanotap::Error;

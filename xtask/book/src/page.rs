@@ -86,10 +86,18 @@ impl Page {
         }
     }
 
-    /// The page for mdBook: formulas in MathML, and link targets replaced by `moved`.
-    pub(crate) fn written(&self, moved: impl Fn(&str) -> Option<String>) -> String {
+    /// The page for mdBook: formulas in MathML, link targets replaced by `moved`, and what `further` gives
+    /// after a link.
+    pub(crate) fn written(
+        &self,
+        moved: impl Fn(&str) -> Option<String>,
+        further: impl Fn(&str) -> Option<String>,
+    ) -> String {
         let mut changes = self.formulas.clone();
         for link in &self.links {
+            if let Some(words) = further(&link.target) {
+                changes.push((link.range.end..link.range.end, words));
+            }
             let Some(target) = moved(&link.target) else {
                 continue;
             };
@@ -138,8 +146,12 @@ mod tests {
         let page = Page::read(text.to_owned());
         assert_eq!(page.anchors, ["a-b-c", "a-b-c-1"]);
         assert_eq!(page.links.len(), 1);
-        let written = page.written(|target| Some(target.replace("README", "index")));
-        assert!(written.contains("[x](y/index.md#z), <math"), "{written}");
+        let further = |target: &str| target.ends_with("#z").then(|| " (more)".to_owned());
+        let written = page.written(|target| Some(target.replace("README", "index")), further);
+        assert!(
+            written.contains("[x](y/index.md#z) (more), <math"),
+            "{written}"
+        );
         assert!(written.contains("$ no [l](m)"), "{written}");
     }
 

@@ -10,6 +10,7 @@ use std::fmt;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
+use nanotap_explorer::link::link;
 use nanotap_paper::Report;
 
 use crate::page::Page;
@@ -160,13 +161,16 @@ impl Site {
     /// # Errors
     /// If a file cannot be read or written.
     pub fn write(&self, folder: &Path) -> Result<(), Trouble> {
-        let summary = self.summary.written(|target| {
-            let target = from_root("docs/SUMMARY.md", target)?;
-            Some(renamed(&target).unwrap_or(target))
-        });
+        let summary = self.summary.written(
+            |target| {
+                let target = from_root("docs/SUMMARY.md", target)?;
+                Some(renamed(&target).unwrap_or(target))
+            },
+            |_| None,
+        );
         put(folder, "SUMMARY.md", summary.as_bytes())?;
         for (name, page) in &self.pages {
-            let text = page.written(renamed);
+            let text = page.written(renamed, |target| self.live(name, target));
             put(
                 folder,
                 &renamed(name).unwrap_or_else(|| name.clone()),
@@ -188,6 +192,15 @@ impl Site {
     }
 
     /// The pages in the summary, from the repository's root.
+    /// The link that opens a case file in the page, after a link to it.
+    fn live(&self, name: &str, target: &str) -> Option<String> {
+        let path = from_root(name, target).filter(|path| path.ends_with(".toml"))?;
+        let case = fs::read_to_string(self.root.join(path)).ok()?;
+        // The explorer is one folder above the documents.
+        let page = "../".repeat(name.matches('/').count() + 1);
+        Some(format!(" ([open this case]({}))", link(&page, &case)))
+    }
+
     fn listed(&self) -> impl Iterator<Item = String> {
         let links = self.summary.links.iter();
         links.filter_map(|link| from_root("docs/SUMMARY.md", &link.target))

@@ -4,10 +4,12 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use nanotap::case::{Case, file};
+use nanotap_explorer::link::{PAGE, link};
 use nanotap_server::{Options, serve};
 
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::{Output, print};
 use crate::progress;
 
 /// Change parameters of a case in a browser and see the motion
@@ -31,9 +33,18 @@ pub(crate) struct Arguments {
     /// Print the address without opening a browser
     #[arg(long)]
     no_browser: bool,
+
+    /// Print a link that holds the case, for a page that needs no server, and end
+    #[arg(long)]
+    link: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    if arguments.link {
+        let source = arguments.file.as_deref().map(file::read).transpose()?;
+        let case = Case::parse(source, &file::with_tables(&arguments.set)?)?;
+        return print(&format!("{}\n", link(PAGE, &case.to_toml())));
+    }
     let options = Options {
         case: arguments.file.clone(),
         set: arguments.set.clone(),

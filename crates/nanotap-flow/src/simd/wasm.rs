@@ -18,7 +18,7 @@ type Half = x::v128;
 /// `a b + c` of numbers, rounded once.
 #[inline(always)]
 pub(crate) fn fused_numbers(a: f64, b: f64, c: f64) -> f64 {
-    let [a, b, c] = [a, b, c].map(x::f64x2_splat);
+    let [a, b, c] = [a, b, c].map(|number| x::f64x2_splat(number));
     x::f64x2_extract_lane::<0>(x::f64x2_relaxed_madd(a, b, c))
 }
 

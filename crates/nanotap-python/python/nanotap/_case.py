@@ -315,6 +315,18 @@ class Case:
 
         return Explorer(self, browser)
 
+    def link(self, *, page: str | None = None) -> str:
+        """A link that holds the case: the page that it leads to, which needs no server, opens it, and
+        nothing is sent anywhere. `page` is the address of another copy of the page.
+
+        >>> Case.paper().link(page="nanotap.html")[:18]
+        'nanotap.html#case='
+
+        Raises:
+            RuntimeError: the setpoint is not reached.
+        """
+        return _nanotap.link(self.to_toml(), page)
+
     def to_dict(self) -> dict[str, Any]:
         """The whole document, as the terminal's `nanotap case --json`."""
         document: dict[str, Any] = json.loads(self._core.document_at_setpoint)

@@ -1,0 +1,67 @@
+// Compares the answers of the WebAssembly modules with those of the native program, byte for byte:
+//   node compare.mjs FOLDER_OF_NATIVE_ANSWERS MODULE.wasm...
+// and prints how long each answer took.
+
+import fs from "node:fs";
+import path from "node:path";
+import v8 from "node:v8";
+
+// Older versions know fused multiply-add by this name only.
+v8.setFlagsFromString("--experimental-wasm-relaxed-simd");
+
+const [folder, ...modules] = process.argv.slice(2);
+const QUICK = 1.5; // seconds; a quick request is asked twice
+const read = new TextDecoder();
+const write = new TextEncoder();
+
+async function opened(file) {
+  const compiled = await WebAssembly.compile(fs.readFileSync(file));
+  const core = { lines: [], answer: null, panic: "" };
+  const bytes = (start, length) => new Uint8Array(core.memory.buffer, start, length);
+  const { exports } = await WebAssembly.instantiate(compiled, { nanotap: {
+    now: () => performance.now(),
+    line: (start, length) => { core.lines.push(read.decode(bytes(start, length))); },
+    panicked: (start, length) => { core.panic = read.decode(bytes(start, length)); },
+    reply: (answered, kind, kindLength, start, length) => { core.answer = Buffer.from(bytes(start, length).slice()); },
+  } });
+  core.memory = exports.memory;
+  core.ask = (address, body) => {
+    Object.assign(core, { lines: [], answer: null });
+    const begun = performance.now();
+    const [head, rest] = [write.encode(address), write.encode(JSON.stringify(body))];
+    const start = exports.room(head.length + rest.length);
+    bytes(start, head.length).set(head);
+    bytes(start + head.length, rest.length).set(rest);
+    exports.answer(start, head.length + rest.length, head.length);
+    // How far a study is depends on the clock.
+    const lines = core.lines.filter((line) => !("progress" in JSON.parse(line)));
+    const whole = Buffer.concat([Buffer.from(lines.map((line) => `${line}\n`).join("")), core.answer]);
+    return [whole, (performance.now() - begun) / 1e3];
+  };
+  return core;
+}
+
+let different = 0;
+const native = JSON.parse(fs.readFileSync(path.join(folder, "times.json")));
+for (const file of modules) {
+  console.log(`\n${path.basename(file)}: seconds native, here, ratio`);
+  let core = await opened(file);
+  for (const [name, address, body] of JSON.parse(fs.readFileSync(path.join(folder, "requests.json")))) {
+    let words;
+    try {
+      let [answer, least] = core.ask(address, body);
+      if (least < QUICK) { const [again, time] = core.ask(address, body); [answer, least] = [again, Math.min(least, time)]; }
+      const same = answer.equals(fs.readFileSync(path.join(folder, name.replaceAll(" ", "-"))));
+      if (!same) { different += 1; if (process.env.KEEP) fs.writeFileSync(path.join(process.env.KEEP, name.replaceAll(" ", "-")), answer); }
+      words = `${native[name].toFixed(4).padStart(9)} ${least.toFixed(4).padStart(9)} ${(least / native[name]).toFixed(1).padStart(6)}  ${same ? "same" : "DIFFERENT"}`;
+    } catch (error) {
+      different += 1;
+      words = `FAILED: ${core.panic || error}`;
+      core = await opened(file);
+    }
+    console.log(`${name.padEnd(28)} ${words}`);
+  }
+  console.log(`memory: ${core.memory.buffer.byteLength / 2 ** 20} MiB`);
+}
+console.log(different ? `${different} answers differ` : "every answer is the native one, byte for byte");
+process.exit(different ? 1 : 0);

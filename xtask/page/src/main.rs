@@ -1,0 +1,114 @@
+//! Writes the page that needs no server: `nanotap-page REPOSITORY MODULE FOLDER`.
+//!
+//! The folder then has the page's files for any web server, with the module for machines that fuse
+//! multiply-adds and the one for those that do not, and `nanotap.html`, the same in one file.
+
+#![expect(
+    clippy::disallowed_methods,
+    reason = "it reads files of this repository"
+)]
+
+mod bundle;
+mod exact;
+mod single;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What the static page may load: only what lies beside it.
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; \
+    style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; manifest-src 'self'; \
+    base-uri 'none'; form-action 'none'";
+/// Where the policy is put: after the first element of the page's head.
+const HEAD: &str = "<meta charset=\"utf-8\">\n";
+
+/// Why the page was not written.
+#[derive(Debug, thiserror::Error)]
+enum PageError {
+    #[error("{}: {error}", path.display())]
+    File {
+        path: PathBuf,
+        error: std::io::Error,
+    },
+    #[error(transparent)]
+    Module(#[from] exact::ModuleError),
+    #[error(transparent)]
+    Bundle(#[from] bundle::BundleError),
+    #[error("index.html has no `{0}`")]
+    Index(&'static str),
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [repository, module, folder] = arguments.as_slice() else {
+        eprintln!("usage: nanotap-page REPOSITORY MODULE FOLDER");
+        return ExitCode::from(2);
+    };
+    match write(repository, module, folder) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageError> {
+    let source = repository.join("crates/nanotap-explorer/page");
+    let fused = read(module)?;
+    let exact = exact::rewritten(&fused)?;
+    let mut texts = BTreeMap::new();
+    let listing = fs::read_dir(&source).map_err(of(&source))?;
+    for path in listing.flatten().map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let text = fs::read_to_string(&path).map_err(of(&path))?;
+        texts.insert(name.into_owned(), text);
+    }
+    let index = texts.get("index.html").map_or("", String::as_str);
+    let whole = single::page(&texts, &fused, &exact)?;
+    let policy = format!("{HEAD}{}", policy(POLICY));
+    let static_index = replaced(index, HEAD, &policy)?;
+    fs::create_dir_all(folder).map_err(of(folder))?;
+    texts.insert("index.html".into(), static_index);
+    let modules = [("nanotap.wasm", &fused), ("nanotap-exact.wasm", &exact)];
+    let texts = texts
+        .iter()
+        .map(|(name, text)| (name.as_str(), text.as_bytes()));
+    let modules = modules
+        .iter()
+        .map(|(name, bytes)| (*name, bytes.as_slice()));
+    for (name, bytes) in texts
+        .chain(modules)
+        .chain([("nanotap.html", whole.as_bytes())])
+    {
+        let path = folder.join(name);
+        fs::write(&path, bytes).map_err(of(&path))?;
+        println!("{:>9} bytes  {}", bytes.len(), path.display());
+    }
+    Ok(())
+}
+
+/// The element that states a policy.
+fn policy(content: &str) -> String {
+    format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{content}\">\n")
+}
+
+/// A text with the one occurrence of a part replaced.
+fn replaced(text: &str, part: &'static str, by: &str) -> Result<String, PageError> {
+    if text.contains(part) {
+        Ok(text.replacen(part, by, 1))
+    } else {
+        Err(PageError::Index(part))
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, PageError> {
+    fs::read(path).map_err(of(path))
+}
+
+fn of(path: &Path) -> impl FnOnce(std::io::Error) -> PageError {
+    let path = path.to_owned();
+    move |error| PageError::File { path, error }
+}

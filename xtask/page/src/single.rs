@@ -1,0 +1,72 @@
+//! The page in one file, which opens from the disk.
+
+use std::collections::BTreeMap;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use miniz_oxide::deflate::compress_to_vec;
+use sha2::{Digest as _, Sha256};
+
+use crate::{HEAD, PageError, bundle, policy, replaced};
+
+/// Level of the compression of modules.
+const LEVEL: u8 = 10;
+/// What the page loads that is in the one file.
+const STYLE: &str = "<link rel=\"stylesheet\" href=\"./style.css\">\n";
+const SCRIPT: &str = "<script type=\"module\" src=\"./main.js\"></script>\n";
+const MANIFEST: &str = "<link rel=\"manifest\" href=\"./manifest.webmanifest\">\n";
+const END: &str = "</body>";
+
+/// The page, with both modules.
+pub(crate) fn page(
+    texts: &BTreeMap<String, String>,
+    fused: &[u8],
+    exact: &[u8],
+) -> Result<String, PageError> {
+    let text = |name: &str| texts.get(name).map_or("", String::as_str);
+    let script = safe(&bundle::script(texts, "main.js")?);
+    let style = text("style.css");
+    let [of_script, of_style] = [&script, style].map(hash);
+    let content = format!(
+        "default-src 'none'; script-src '{of_script}' 'wasm-unsafe-eval' blob:; worker-src blob:; \
+         style-src '{of_style}'; img-src data: blob:; base-uri 'none'; form-action 'none'"
+    );
+    let mut page = text("index.html").to_owned();
+    page = replaced(&page, HEAD, &format!("{HEAD}{}", policy(&content)))?;
+    page = replaced(&page, STYLE, &format!("<style>{style}</style>\n"))?;
+    page = replaced(&page, SCRIPT, "")?;
+    page = page.replace(MANIFEST, "");
+    let part = |id: &str, kind: &str, text: &str| {
+        format!("<script type=\"{kind}\" id=\"{id}\">{text}</script>\n")
+    };
+    let parts = [
+        part("nanotap-worker", "text/plain", &safe(text("worker.js"))),
+        part("nanotap-module", "application/octet-stream", &packed(fused)),
+        part(
+            "nanotap-module-exact",
+            "application/octet-stream",
+            &packed(exact),
+        ),
+        format!("<script>{script}</script>\n"),
+        END.to_owned(),
+    ];
+    replaced(&page, END, &parts.concat())
+}
+
+/// A script that may stand in a page.
+fn safe(script: &str) -> String {
+    script.replace("</script", "<\\/script")
+}
+
+/// Bytes, deflated, in base64.
+fn packed(bytes: &[u8]) -> String {
+    STANDARD.encode(compress_to_vec(bytes, LEVEL))
+}
+
+/// The source of a policy that permits exactly this text.
+fn hash(text: &str) -> String {
+    format!(
+        "sha256-{}",
+        STANDARD.encode(Sha256::digest(text.as_bytes()))
+    )
+}

@@ -26,7 +26,13 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     forget(&target);
     let mut command = workspace.cargo(&["package", "--workspace", "--locked"]);
     command.arg("--target-dir").arg(&target);
-    for own in ["xtask", "nanotap-book", "nanotap-page", "nanotap-python", "nanotap-web"] {
+    for own in [
+        "xtask",
+        "nanotap-book",
+        "nanotap-page",
+        "nanotap-python",
+        "nanotap-web",
+    ] {
         command.args(["--exclude", own]);
     }
     // The build tests compilation, not speed; uncommitted changes are packed too.

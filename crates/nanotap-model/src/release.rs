@@ -41,7 +41,7 @@ const CHATTER_CHANGE: f64 = 1e-8;
 const SLOWEST_IMPACT: f64 = 1e-15;
 const MAX_NEWTON_STEPS: usize = 60;
 /// Largest order of a Taylor series.
-const MAX_ORDER: u64 = 200;
+const MAX_ORDER: u32 = 200;
 /// Smallest difference of |k · gap / F| from 1: where the drive only just lifts the mass off the stop,
 /// the phase of the release is not determined.
 const WEAKEST_RELEASE: f64 = 1e-9;

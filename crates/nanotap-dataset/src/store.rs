@@ -236,15 +236,15 @@ impl Store {
     }
 
     /// Reads a file of the store of at most `limit` bytes.
-    fn read(&self, path: PathBuf, limit: u64) -> Result<Vec<u8>, InputError> {
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, InputError> {
         let Some(files) = self.memory() else {
-            return input::read(&path, limit, Origin::File);
+            return input::read(path, limit, Origin::File);
         };
         let missing = || InputError {
-            path: path.clone(),
+            path: path.into(),
             fault: InputFault::Missing,
         };
-        files.get(&path).cloned().ok_or_else(missing)
+        files.get(path).cloned().ok_or_else(missing)
     }
 
     /// Whether the store is in memory.
@@ -310,7 +310,7 @@ impl Store {
     fn read_file(&self, variable: &Variable, block: &Block) -> Result<Vec<u8>, InputError> {
         let entries = self.schema.grid.chunk_entries() * variable.stride();
         let limit = longest_stream(entries * variable.kind.size());
-        self.read(self.file(variable, block), limit)
+        self.read(&self.file(variable, block), limit)
     }
 
     fn file(&self, variable: &Variable, block: &Block) -> PathBuf {
@@ -508,7 +508,7 @@ impl Store {
     /// # Errors
     /// If the file system fails.
     pub fn read_beside(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        match self.read(self.path.join(name), MAX_TABLE_BYTES) {
+        match self.read(&self.path.join(name), MAX_TABLE_BYTES) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.is_missing() => Ok(None),
             Err(error) => Err(error.into()),

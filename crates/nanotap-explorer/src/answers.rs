@@ -72,17 +72,17 @@ impl Explorer {
         line: &(dyn Fn(Value) + Sync),
     ) -> Answer {
         let answer = match path {
-            "/api/about" => json(preset::about(self)),
+            "/api/about" => Ok(json(&preset::about(self))),
             "/api/case" => export::shown(self).map(|text| ("application/toml", text.into_bytes())),
             "/api/motion" => read(body)
                 .and_then(|request| motion::answer(self, &request, control))
-                .and_then(json),
+                .map(|value| json(&value)),
             "/api/law" => read(body)
                 .and_then(|request| law::changes(self, &request))
-                .and_then(json),
+                .map(|value| json(&value)),
             "/api/attractors" => read(body)
                 .and_then(|request| census::listed(self, &request, control))
-                .and_then(json),
+                .map(|value| json(&value)),
             "/api/figure" => read(body).and_then(|wish| figures::redrawn(&wish)),
             "/api/export" => read(body).and_then(|wish| export::exported(self, &wish, control)),
             "/api/study" => {
@@ -121,6 +121,6 @@ fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, ApiError> {
         .map_err(|error| ApiError::input(format!("not a request of the page: {error}"), ""))
 }
 
-fn json(value: Value) -> Result<(&'static str, Vec<u8>), ApiError> {
-    Ok((JSON, value.to_string().into_bytes()))
+fn json(value: &Value) -> (&'static str, Vec<u8>) {
+    (JSON, value.to_string().into_bytes())
 }

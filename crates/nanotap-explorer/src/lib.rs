@@ -32,6 +32,7 @@ mod api_error;
 mod census;
 mod clicks;
 mod commands;
+mod content;
 mod export;
 mod figures;
 mod film;

@@ -11,12 +11,9 @@ pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     /// Creates one in the system's folder of temporary files.
-    #[cfg_attr(
-        not(test),
-        expect(
-            clippy::disallowed_methods,
-            reason = "the folder that is made in it is this user's alone"
-        )
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the folder that is made in it is this user's alone"
     )]
     pub(crate) fn new() -> Result<Self, Error> {
         let folder = std::env::temp_dir();

@@ -88,7 +88,7 @@ impl Workers {
         }
         let _done = Done(Arc::clone(&self.running), Arc::clone(&own));
         match Self::run_in(&self.motions, (*own).clone(), work).await {
-            Ok(answer) if answer.outcome == Outcome::Stopped => failed(format!(
+            Ok(answer) if answer.outcome == Outcome::Stopped => failed(&format!(
                 "stopped: {MOTIONS} newer motions were requested, from other pages perhaps"
             )),
             answer => response(answer),
@@ -167,7 +167,7 @@ impl Workers {
 fn response(answer: Result<Answer, String>) -> Response {
     let answer = match answer {
         Ok(answer) => answer,
-        Err(words) => return failed(words),
+        Err(words) => return failed(&words),
     };
     let status = match answer.outcome {
         Outcome::Answered => StatusCode::OK,
@@ -179,8 +179,8 @@ fn response(answer: Result<Answer, String>) -> Response {
 }
 
 /// The response to a request that was right, but was not answered.
-fn failed(words: String) -> Response {
-    (StatusCode::UNPROCESSABLE_ENTITY, Json(refusal(&words))).into_response()
+fn failed(words: &str) -> Response {
+    (StatusCode::UNPROCESSABLE_ENTITY, Json(refusal(words))).into_response()
 }
 
 fn refusal(words: &str) -> Value {

@@ -194,8 +194,9 @@ impl Site {
     /// The pages in the summary, from the repository's root.
     /// The link that opens a case file in the page, after a link to it.
     fn live(&self, name: &str, target: &str) -> Option<String> {
-        let path = from_root(name, target).filter(|path| path.ends_with(".toml"))?;
-        let case = fs::read_to_string(self.root.join(path)).ok()?;
+        let path = self.root.join(from_root(name, target)?);
+        path.extension().filter(|ending| *ending == "toml")?;
+        let case = fs::read_to_string(path).ok()?;
         // The explorer is one folder above the documents.
         let page = "../".repeat(name.matches('/').count() + 1);
         Some(format!(" ([open this case]({}))", link(&page, &case)))

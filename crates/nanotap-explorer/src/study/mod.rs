@@ -12,8 +12,6 @@ mod registered;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
@@ -29,6 +27,7 @@ use serde_json::{Map, Value, json};
 use crate::Explorer;
 use crate::api_error::ApiError;
 use crate::commands::{CASE_FILE, case_path, quoted, study_command, study_python};
+use crate::content::Content;
 use crate::figures::{drawn, over_pinned};
 use crate::forms;
 use crate::motion_request::model_of;
@@ -58,25 +57,6 @@ pub(crate) struct StudyRequest {
     /// Whether the first stage is enough.
     #[serde(default)]
     quick: bool,
-}
-
-/// The content of a measured file: a text, or the bytes of any file in base64.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
-enum Content {
-    Text(String),
-    Bytes { base64: String },
-}
-
-impl Content {
-    fn bytes(&self) -> Result<Vec<u8>, ApiError> {
-        match self {
-            Self::Text(text) => Ok(text.as_bytes().to_vec()),
-            Self::Bytes { base64 } => STANDARD.decode(base64).map_err(|error| {
-                ApiError::input(format!("the file is not base64: {error}"), "send it again")
-            }),
-        }
-    }
 }
 
 /// Computes a study, and sends its stages to the page as they come.
@@ -240,30 +220,6 @@ impl Studied<'_> {
         Ok(())
     }
 
-    /// A dataset of a study, in memory.
-    fn dataset<T>(
-        &self,
-        plan: &DatasetPlan,
-        control: &Control<'_>,
-        use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
-    ) -> Result<T, ApiError> {
-        let schema = plan.schema();
-        if schema.bytes().is_none_or(|bytes| bytes > LARGEST_DATASET) {
-            return Err(ApiError::input(
-                "the results would fill the memory",
-                "fewer values, or compute them at the terminal with --out",
-            ));
-        }
-        let store = Store::in_memory(schema.clone());
-        let work = Work {
-            share: Share::WHOLE,
-            threads: 0,
-            control: *control,
-        };
-        plan.compute(&store, &work).map_err(ApiError::of)?;
-        use_it(&store)
-    }
-
     /// The dataset of a stage.
     fn staged<T>(
         &self,
@@ -276,7 +232,7 @@ impl Studied<'_> {
             study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
         let request = Value::Object(request.clone());
         let plan = entry.plan(case, request, self.control)?;
-        self.dataset(&plan, self.control, use_it)
+        dataset(&plan, self.control, use_it)
     }
 
     /// Computes the stages one by one until the work is cancelled; `stage` gets its count and the
@@ -312,6 +268,29 @@ impl Studied<'_> {
         let options: S::Options = read(Value::Object(options.clone()))?;
         Ok(S::run(case, &options, self.control)?)
     }
+}
+
+/// A dataset of a study, in memory.
+fn dataset<T>(
+    plan: &DatasetPlan,
+    control: &Control<'_>,
+    use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
+) -> Result<T, ApiError> {
+    let schema = plan.schema();
+    if schema.bytes().is_none_or(|bytes| bytes > LARGEST_DATASET) {
+        return Err(ApiError::input(
+            "the results would fill the memory",
+            "fewer values, or compute them at the terminal with --out",
+        ));
+    }
+    let store = Store::in_memory(schema.clone());
+    let work = Work {
+        share: Share::WHOLE,
+        threads: 0,
+        control: *control,
+    };
+    plan.compute(&store, &work).map_err(ApiError::of)?;
+    use_it(&store)
 }
 
 /// A command after lines that replace `[scan]`, the last table of a saved case.

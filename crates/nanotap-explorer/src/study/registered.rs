@@ -6,7 +6,7 @@ use nanotap::study::registry::{DatasetPlan, StudyEntry, study as study_named};
 use nanotap_figures::Figure;
 use serde_json::Value;
 
-use super::{Stage, Studied};
+use super::{Stage, Studied, dataset};
 use crate::api_error::ApiError;
 use crate::forms;
 use crate::motion_request::model_of;
@@ -62,7 +62,7 @@ impl Studied<'_> {
         plan: impl FnOnce(&Control<'_>) -> Result<DatasetPlan, Error>,
     ) -> Result<(Value, Option<Figure>), ApiError> {
         self.counting(entry.counted, |control| {
-            self.dataset(&plan(control)?, control, |store| {
+            dataset(&plan(control)?, control, |store| {
                 let summary = entry.summary.map(|of| of(store)).transpose()?;
                 Ok(summary.map_or_else(Default::default, |(summary, figure)| {
                     (summary, Some(figure))

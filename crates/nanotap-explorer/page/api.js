@@ -1,46 +1,48 @@
-// Requests to the server. Of each kind of request only the newest is active: a new one cancels the
-// previous one, and the server stops working on it.
+// Requests of the page and their answers. Of each kind of request only the newest is active: a new one
+// cancels the previous one, and no more work is done on it.
+//
+// The modules of the page are also put into one file, by a program that knows no JavaScript: it wraps each
+// in a function, those that a module imports before it. Therefore a module imports, at its beginning and
+// each on one line, only as `import { a, b as c } from "./x.js";` or `import * as x from "./x.js";`; it
+// exports only by `export` at the beginning of a line, before `const`, `let`, `class`, `function` or
+// `async function`; an exported `let` is not set again; and no two modules import each other. `worker.js`
+// and `service-worker.js` are no modules and import nothing.
 
-const token = new URLSearchParams(location.search).get("token") ?? "";
+import * as server from "./server.js";
+import * as workers from "./workers.js";
+
 const running = new Map();
 
-/** A refused request, with the keys and fields that the server names. */
+/** Whether the page has no server: its requests are answered in the page itself. */
+export const alone = !server.token;
+
+/** A refused request, with the keys and fields that the answer names. */
 export class Refused extends Error {
   constructor(message, keys = []) { super(message); this.keys = keys; }
 }
 
-const ENDED = "nanotap explore has ended; start it again";
+const parsed = (bytes) => JSON.parse(new TextDecoder().decode(bytes));
 
-async function send(kind, path, body) {
+async function send(kind, path, body, line) {
   running.get(kind)?.abort();
   const control = new AbortController();
   running.set(kind, control);
-  const sent = fetch(path, {
-    method: body === undefined ? "GET" : "POST",
-    headers: { "x-nanotap-token": token, ...(body === undefined ? {} : { "content-type": "application/json" }) },
-    body: body === undefined ? undefined : JSON.stringify(body),
-    signal: control.signal,
-  });
-  // Without an answer of the server there is only a TypeError with the browser's words.
-  const answer = await sent.catch((error) => { throw superseded(error) ? error : new Refused(ENDED); });
-  if (!answer.ok) {
-    const text = await answer.text();
-    let refusal = { error: text };
-    try { refusal = JSON.parse(text); } catch { /* plain words */ }
-    throw new Refused(refusal.error || `${answer.status} ${answer.statusText}`, refusal.keys);
-  }
-  return answer;
+  const answer = await (alone ? workers : server).send(path, body, control.signal, line);
+  if (answer.answered) return answer;
+  const refusal = parsed(answer.bytes);
+  throw new Refused(refusal.error, refusal.keys);
 }
 
 /** Whether an error only means that a newer request replaced this one. */
 export const superseded = (error) => error?.name === "AbortError";
 
 export async function ask(kind, path, body) {
-  return (await send(kind, path, body)).json();
+  return parsed((await send(kind, path, body)).bytes);
 }
 
 export async function bytes(kind, path, body) {
-  return (await send(kind, path, body)).blob();
+  const answer = await send(kind, path, body);
+  return new Blob([answer.bytes], { type: answer.kind });
 }
 
 /** Saves a file under a name. */
@@ -59,23 +61,11 @@ export function stop(kind) {
   running.get(kind)?.abort();
 }
 
-/** Passes every line of a streamed response to `take`, parsed. */
+/** Passes every line of a streamed answer to `take`, parsed. */
 export async function stream(kind, path, body, take) {
-  const answer = await send(kind, path, body);
-  const reader = answer.body.getReader();
-  const decoder = new TextDecoder();
-  let rest = "";
-  for (;;) {
-    const { done, value } = await reader.read().catch((error) => { throw superseded(error) ? error : new Refused(ENDED); });
-    rest += decoder.decode(value ?? new Uint8Array(), { stream: !done });
-    const lines = rest.split("\n");
-    rest = lines.pop();
-    for (const line of lines) {
-      if (!line) continue;
-      const message = JSON.parse(line);
-      if (message.error) throw new Refused(message.error, message.keys);
-      take(message);
-    }
-    if (done) return;
-  }
+  await send(kind, path, body, (line) => {
+    const message = JSON.parse(line);
+    if (message.error) throw new Refused(message.error, message.keys);
+    take(message);
+  });
 }

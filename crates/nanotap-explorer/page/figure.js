@@ -1,4 +1,4 @@
-// Figures in the page: the server sends their description, which is drawn here in the visible range, read
+// Figures in the page: an answer contains their description, which is drawn here in the visible range, read
 // under the pointer and zoomed.
 
 import { described, layout, paint, part, plain, value } from "./plot.js";

@@ -1,7 +1,7 @@
-// The controls: one for every key of the case, made from the server's table of keys. Keys that say the
+// The controls: one for every key of the case, made from the core's table of keys. Keys that say the
 // same are one control with a switch.
 
-import { state, put as state_put, theCase } from "./state.js";
+import { basis, state, put as state_put, theCase } from "./state.js";
 import { ask, superseded } from "./api.js";
 
 const form = document.getElementById("knobs");
@@ -33,14 +33,14 @@ function element(name, properties = {}, ...children) {
 export function show(keys, keep = false) {
   const outline = (all) => JSON.stringify(all.map((key) => [key.name, key.value === "", key.stated, key.choices && key.value]));
   if ((keep || dragged()) && shown.length) update(keys, true);
-  else if (outline(keys) === outline(shown) && form.dataset.preset === state.preset) update(keys, false);
+  else if (outline(keys) === outline(shown) && form.dataset.basis === basis()) update(keys, false);
   else build(keys);
   shown = keys;
 }
 
 function build(keys) {
   const focused = document.activeElement?.id;
-  form.dataset.preset = state.preset;
+  form.dataset.basis = basis();
   form.replaceChildren();
   const places = (name) => keys.filter((key) => key.group === name);
   for (const [name, title] of Object.entries(GROUPS)) {
@@ -153,7 +153,7 @@ function summed(key, meaning) {
   return field;
 }
 
-/** Another contact law: the server says which keys it does not take and which it needs. */
+/** Another contact law: the answer says which keys it does not take and which it needs. */
 async function law(key, text, field) {
   try {
     const answer = await ask("law", "/api/law", { case: theCase(), law: text });

@@ -1,12 +1,14 @@
 // The page: controls on the left, the lever and the main figure in the middle, what one wants to know on
 // the right, everything else below.
 
-import { state, caseText, decode, remember, takeBase, theCase } from "./state.js";
+import { state, basis, caseText, decode, names, remember, takeBase, texts, theCase } from "./state.js";
 import { ask, bytes, save, stop, superseded } from "./api.js";
 import * as knobs from "./knobs.js";
 import * as lever from "./lever.js";
 import * as figure from "./figure.js";
 import * as study from "./study.js";
+import * as link from "./link.js";
+import * as offline from "./offline.js";
 
 const $ = (id) => document.getElementById(id);
 const BUSY_DELAY = 300;        // milliseconds before the page shows that it computes
@@ -31,6 +33,7 @@ const LESSONS = {
   plan: ["An imaging window below a peak force", "preset=dmt&tab=plan&ran=yes&study.force=4+nN",
     "The black line surrounds the free amplitudes and setpoints at which the peak force stays below 4 nN and no second motion exists. Click inside it: the case takes these values. Change the force, then press Compute."],
 };
+const OPEN = "open";           // the entry of the list that opens a case file
 let about = null;
 let outdated = false;         // a value changed while a motion was being computed
 let underway = false;
@@ -65,7 +68,7 @@ export async function refresh() {
   let next = request();
   while (next) {
     const { wish, motion, error } = await next;
-    // The server computes the next motion while this one is drawn.
+    // The next motion is computed while this one is drawn.
     next = outdated && !follows() ? request() : null;
     if (wish.epoch !== epoch) { /* dropped */ }
     else if (motion) {
@@ -87,7 +90,7 @@ function request() {
   outdated = false;
   const wish = { case: theCase(), start: state.start, steps: state.steps, ranges: !moving };
   if (follows() && caseText() !== displayed.text) Object.assign(wish, { from: displayed.case, start: displayed.start });
-  const asked = { ...wish, epoch, text: caseText() };
+  const asked = { ...wish, epoch, text: caseText(), basis: basis() };
   const patience = setInterval(() => { if (outdated || asked.epoch !== epoch) stop("motion"); }, PATIENCE);
   const answer = ask("motion", "/api/motion", wish);
   return answer.then((motion) => ({ wish: asked, motion }), (error) => ({ wish: asked, error }))
@@ -107,7 +110,7 @@ function show(motion, wish) {
     remember(false);
   }
   stale(false);
-  takeBase(wish.case, motion.keys);
+  takeBase(wish.basis, wish.case, motion.keys);
   knobs.follows(motion.readout);
   knobs.show(motion.keys, moving);
   $("summary").textContent = `${motion.title}: ${motion.summary}`;
@@ -253,15 +256,41 @@ async function exported(format) {
   save(blob, format === "toml" ? "case.toml" : format === "csv" ? "motion.csv" : `${$("which").value}.${format}`);
 }
 
-function takeOver() {
-  const before = state.preset;
-  decode(location.hash);
-  if (!about.presets.some((p) => p.name === state.preset)) state.preset = about.presets[0].name;
-  if (state.preset !== before) found = null;
-  $("preset").value = state.preset;
+/** Another case, without changes: one of the list, or an opened file. */
+function fresh(name) {
+  const chosen = texts.has(name) ? { preset: "", case: name } : { preset: name, case: "" };
+  Object.assign(state, { ...chosen, set: {}, start: "", study: {}, ran: "", views: {}, lesson: "" });
+  remembered();
+  takeOver();
+}
+
+async function openFile(file) {
+  try {
+    if (file) fresh(await link.open(file));
+  } catch (error) { if (!superseded(error)) say(error); }
+}
+
+/** Shows which case it is; an opened file comes into the list. */
+function list() {
+  const own = $("yours");
+  if (state.case && ![...own.children].some((one) => one.value === state.case)) own.append(new Option(names.get(state.case), state.case));
+  own.hidden = !own.children.length;
+  $("preset").value = basis();
+}
+
+async function takeOver() {
+  const address = location.hash;
+  const wrong = await link.read(new URLSearchParams(address.slice(1)).get("case"));
+  if (address !== location.hash) return;
+  const before = basis();
+  decode(wrong ? "" : address);
+  if (state.case) state.preset = "";
+  else if (!about.presets.some((p) => p.name === state.preset)) state.preset = about.presets[0].name;
+  if (basis() !== before) found = null;
+  list();
   $("steps").value = state.steps;
   $("follow").checked = state.follow === "yes";
-  $("note").textContent = "";
+  $("note").textContent = wrong && `${wrong} The page shows its first case.`;
   const lesson = LESSONS[state.lesson];
   $("lesson").hidden = !lesson;
   $("lesson").firstElementChild.textContent = lesson ? `${lesson[0]}. ${lesson[2]}` : "";
@@ -272,16 +301,18 @@ function takeOver() {
 }
 
 async function begin() {
+  $("busy").textContent = "loading …";
   try {
     about = await ask("about", "/api/about");
-  } catch (error) { say(error); return; }
+  } catch (error) { say(error); return; } finally { $("busy").textContent = ""; }
   document.title = `nanotap explorer ${about.version}`;
   const groups = new Map();
   for (const preset of about.presets) {
     if (!groups.has(preset.group)) groups.set(preset.group, Object.assign(document.createElement("optgroup"), { label: preset.group }));
     groups.get(preset.group).append(new Option(preset.words, preset.name));
   }
-  $("preset").append(...groups.values());
+  const yours = Object.assign(document.createElement("optgroup"), { id: "yours", label: "Opened files" });
+  $("preset").append(yours, ...groups.values(), new Option("Open a case file …", OPEN));
   $("lessons").append(...Object.entries(LESSONS).map(([name, [words, address]]) => {
     const item = document.createElement("li");
     item.append(Object.assign(document.createElement("a"), { href: `#${address}&lesson=${name}`, textContent: words }));
@@ -289,13 +320,13 @@ async function begin() {
   }));
   $("lessons").addEventListener("click", () => { $("learn").open = false; });
   $("lesson").lastElementChild.addEventListener("click", () => { state.lesson = ""; $("lesson").hidden = true; remember(true); });
-  const fresh = (preset) => {
-    Object.assign(state, { preset, set: {}, start: "", study: {}, ran: "", views: {}, lesson: "" });
-    remembered();
-    takeOver();
-  };
-  $("preset").addEventListener("change", () => fresh($("preset").value));
-  $("reset").addEventListener("click", () => fresh(state.preset));
+  $("preset").addEventListener("change", () => {
+    if ($("preset").value !== OPEN) { fresh($("preset").value); return; }
+    list();
+    $("open").click();
+  });
+  $("open").addEventListener("change", () => openFile($("open").files[0]));
+  $("reset").addEventListener("click", () => fresh(basis()));
   $("undo").addEventListener("click", () => { steps -= 1; $("undo").disabled = steps <= 0; history.back(); });
   knobs.onChange((_, finished, note) => {
     moving = !finished;
@@ -324,7 +355,10 @@ async function begin() {
   $("knobs").addEventListener("submit", (event) => event.preventDefault());
   addEventListener("popstate", takeOver);
   addEventListener("hashchange", takeOver);
-  study.begin(() => { markCensus(); elsewhere(); }, about.studies);
+  study.begin(() => { markCensus(); elsewhere(); }, about.studies, openFile);
+  $("share").addEventListener("click", () => link.share(basis() === "file").catch(say));
+  $("link-close").addEventListener("click", () => $("link").close());
+  offline.begin();
   takeOver();
 }
 

@@ -1,7 +1,8 @@
 // The state of the page, and the address that contains all of it: a link reproduces a view.
 
 const empty = () => ({
-  preset: "",                 // the case from which the values start
+  preset: "",                 // the case from which the values start, if it is one of the list
+  case: "",                   // or its file, as a link contains it: see link.js
   set: {},                    // keys of the case that differ from it: key -> text
   start: "",                  // state at drive phase 0 from which the motion is computed
   follow: "",                 // "yes": a changed parameter continues from the displayed motion
@@ -15,12 +16,19 @@ const empty = () => ({
 
 export const state = empty();
 
-const FIELDS = ["preset", "lesson", "start", "follow", "tab", "steps", "ran"];
+/** The texts of case files, by what stands for them in a link; and their names. */
+export const texts = new Map();
+export const names = new Map();
 
-/** The fragment of the address for `state`. */
-export function encoded() {
+/** What stands for the case without its changes. */
+export const basis = () => state.case || state.preset;
+
+const FIELDS = ["preset", "case", "lesson", "start", "follow", "tab", "steps", "ran"];
+
+/** The fragment of the address for `state`; some fields may have other values. */
+export function encoded(other = {}) {
   const words = new URLSearchParams();
-  for (const name of FIELDS) if (state[name]) words.set(name, state[name]);
+  for (const name of FIELDS) if (other[name] ?? state[name]) words.set(name, other[name] ?? state[name]);
   for (const [key, value] of Object.entries(state.set)) words.set(`set.${key}`, value);
   for (const [key, value] of Object.entries(state.study)) words.set(`study.${key}`, value);
   for (const [name, views] of Object.entries(state.views)) {
@@ -56,30 +64,31 @@ export function remember(finished) {
   return finished;
 }
 
-let base = { preset: "", values: new Map() };
+let base = { of: "", values: new Map() };
 
-/** Takes what the preset states, from the keys of its case without changes. */
-export function takeBase({ preset, set }, keys) {
-  if (!set.length) base = { preset, values: new Map(keys.filter((key) => key.stated).map((key) => [key.name, key.value])) };
+/** Takes what a case states, from its keys without changes. */
+export function takeBase(of, { set }, keys) {
+  if (!set.length) base = { of, values: new Map(keys.filter((key) => key.stated).map((key) => [key.name, key.value])) };
 }
 
-/** States a value, in place of all that says the same. The preset's own value is no change. */
+/** States a value, in place of all that says the same. The case's own value is no change. */
 export function put(name, text, alternatives = []) {
   for (const other of alternatives) delete state.set[other];
-  if (text !== "" && base.preset === state.preset && base.values.get(name) === text) delete state.set[name];
+  if (text !== "" && base.of === basis() && base.values.get(name) === text) delete state.set[name];
   else state.set[name] = text;
 }
 
 /** The text of a stated value, if it is known. */
-export const statedText = (name) => state.set[name] ?? (base.preset === state.preset ? base.values.get(name) : undefined);
+export const statedText = (name) => state.set[name] ?? (base.of === basis() ? base.values.get(name) : undefined);
 
 /** The case as a text, for comparison; without some keys. */
 export function caseText(without = []) {
   const kept = Object.entries(state.set).filter(([key]) => !without.includes(key)).sort();
-  return JSON.stringify([state.preset, kept]);
+  return JSON.stringify([basis(), kept]);
 }
 
-/** The case as sent to the server. */
+/** The case as a request contains it. */
 export function theCase() {
-  return { preset: state.preset, set: Object.entries(state.set).map(([key, value]) => `${key}=${value}`) };
+  const set = Object.entries(state.set).map(([key, value]) => `${key}=${value}`);
+  return state.case ? { text: texts.get(state.case), set } : { preset: state.preset, set };
 }

@@ -1,8 +1,8 @@
 // The studies: a form for each, its figure in stages of increasing resolution, and clicks that go
 // to a motion.
 
-import { state, caseText, put, remember, statedText, theCase } from "./state.js";
-import { bytes, current, save, stream, stop, superseded } from "./api.js";
+import { state, basis, caseText, put, remember, statedText, theCase } from "./state.js";
+import { alone, bytes, current, save, stream, stop, superseded } from "./api.js";
 import { sameAs } from "./knobs.js";
 import * as figure from "./figure.js";
 import { moves } from "./lever.js";
@@ -31,6 +31,7 @@ const LINE = 6000;            // milliseconds in which the tip goes along the li
 const FIRST = 5;              // fields of a form that are shown at once, if it has more than one in addition
 const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
 const PAUSE = 250;            // milliseconds after a change before an approach curve is drawn anew
+const TERMINAL = 60000;       // milliseconds after which the page without a server names the terminal
 const OTHER = "computed for other values – compute again";
 const PLAIN = {};             // studies that the page knows from the registry only: name -> what they are about
 let plain = {};               // their forms
@@ -45,9 +46,10 @@ let shown = null;             // the displayed figure, as it was received
 let motion = null;            // the displayed motion
 let timer = 0;
 let gone = () => {};
+let openCase = () => {};
 
 const views = () => state.views.study ?? [];
-const asked = () => JSON.stringify([state.preset, state.tab, state.study, state.tab === "data" && measured?.[0]]);
+const asked = () => JSON.stringify([basis(), state.tab, state.study, state.tab === "data" && measured?.[0]]);
 const shape = () => asked() + JSON.stringify([forms[state.tab], state.tab in PLAIN && forms.usual[state.tab]]);
 const hint = () => HINTS[state.tab] ?? `${PLAIN[state.tab]}.`;
 
@@ -122,9 +124,10 @@ const base64Of = (file) => new Promise((done, failed) => {
   reader.readAsDataURL(file);
 });
 
-/** Takes a measured file. */
+/** Takes a measured file, or a case file. */
 async function take(file) {
   if (!file) return;
+  if (file.name.toLowerCase().endsWith(".toml")) { openCase(file); return; }
   if (state.tab !== "data") choose("data");
   if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page reads at most ${MOST_DATA}, the terminal more`; return; }
   measured = [file.name, { base64: await base64Of(file) }];
@@ -134,9 +137,10 @@ async function take(file) {
 }
 
 /** `motionChanged` is called when a click selected another motion; `studies` are those of the registry
- *  that have no tab made for them. */
-export function begin(motionChanged, studies) {
+ *  that have no tab made for them; `openFile` takes a case file. */
+export function begin(motionChanged, studies, openFile) {
   gone = motionChanged;
+  openCase = openFile;
   for (const { name, about, form } of studies) { PLAIN[name] = about; plain[name] = form; }
   $("more").append(...studies.map(({ name, about }) => Object.assign(new Option(name.replaceAll("-", " "), name), { title: about })));
   $("more").addEventListener("change", () => { if ($("more").value) choose($("more").value); });
@@ -195,7 +199,7 @@ export function restore() {
   filled = "";
 }
 
-/** Takes the displayed motion, with the server's forms. A figure of this case stays; one of another case
+/** Takes the displayed motion, with its forms. A figure of this case stays; one of another case
  *  is marked; one that the address contains is computed again, and an approach curve always. */
 export function fill(next) {
   motion = next;
@@ -243,7 +247,7 @@ function forget() {
   $("hover").textContent = "";
 }
 
-/** Creates the form of the tab with the server's initial values. */
+/** Creates the form of the tab with its initial values. */
 function build() {
   const form = $("study-form");
   const fields = forms[state.tab].map(entry);
@@ -462,6 +466,11 @@ async function compute(quick, more = {}) {
   const whole = caseText();
   asking = own;
   let request = null;
+  const slow = setTimeout(() => {
+    if (!alone || asking !== own) return;
+    const command = own.clicks ? `save the case file, then: ${$("study-command").textContent}` : "nanotap explore";
+    $("long").textContent = `This takes long in a browser. On all processors of a machine: ${command}`;
+  }, TERMINAL);
   try {
     const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, quick, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
       // An answer for an older case is dropped.
@@ -490,15 +499,18 @@ async function compute(quick, more = {}) {
   } catch (error) {
     if (asking === own) $("progress").textContent = superseded(error) ? "stopped" : error.message;
   }
-  if (asking === own) asking = null;
+  clearTimeout(slow);
+  if (asking && asking !== own) return;
+  asking = null;
+  $("long").textContent = "";
 }
 
 /** The case of a figure, without the keys along its axes. */
 function caseOf(own, clicks) {
   own.text ??= own.case;
-  const [preset, kept] = JSON.parse(own.text);
+  const [of, kept] = JSON.parse(own.text);
   const left = along(clicks);
-  return JSON.stringify([preset, kept.filter(([key]) => !left.includes(key))]);
+  return JSON.stringify([of, kept.filter(([key]) => !left.includes(key))]);
 }
 
 /** Sets the values of the axes at a place, and shows the motion there. */

@@ -13,6 +13,8 @@ pub struct Part {
 
 const STYLE: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const PICTURE: &str = "image/svg+xml";
+const MANIFEST: &str = "application/manifest+json";
 
 macro_rules! parts {
     ($($kind:ident $name:literal),+ $(,)?) => {
@@ -24,14 +26,23 @@ macro_rules! parts {
 pub const INDEX: &str = include_str!("../page/index.html");
 
 /// What the page loads.
-pub const PARTS: [Part; 9] = parts![
+pub const PARTS: [Part; 18] = parts![
     STYLE "style.css",
+    PICTURE "icon.svg",
+    MANIFEST "manifest.webmanifest",
     SCRIPT "main.js",
     SCRIPT "state.js",
     SCRIPT "api.js",
+    SCRIPT "server.js",
+    SCRIPT "workers.js",
+    SCRIPT "worker.js",
     SCRIPT "knobs.js",
     SCRIPT "lever.js",
     SCRIPT "study.js",
     SCRIPT "figure.js",
     SCRIPT "plot.js",
+    SCRIPT "link.js",
+    SCRIPT "qr.js",
+    SCRIPT "offline.js",
+    SCRIPT "service-worker.js",
 ];

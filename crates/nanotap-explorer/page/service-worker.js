@@ -1,0 +1,28 @@
+// Keeps the files of the page, so that it opens without a network. A new version of the page is loaded while
+// the present one is used, and shown at the next visit.
+
+const VERSION = "development"; // `cargo xtask page` states a hash of all files here.
+const FILES = [
+  "./", "style.css", "icon.svg", "manifest.webmanifest", "main.js", "state.js", "api.js", "server.js", "workers.js", "worker.js",
+  "knobs.js", "lever.js", "study.js", "figure.js", "plot.js", "link.js", "qr.js", "offline.js",
+];
+const PREFIX = "nanotap ";
+// The browser runs one of the two modules.
+const MODULE = new URL(location.href).searchParams.get("module");
+const NAME = `${PREFIX}${registration.scope} ${MODULE} ${VERSION}`;
+
+addEventListener("install", (event) => {
+  const requests = [...FILES, `${MODULE}.wasm`].map((file) => new Request(file, { cache: "no-cache" }));
+  event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(requests)));
+});
+
+addEventListener("activate", (event) => {
+  const older = (name) => name.startsWith(`${PREFIX}${registration.scope} `) && name !== NAME;
+  event.waitUntil(caches.keys().then((names) => Promise.all(names.filter(older).map((name) => caches.delete(name)))));
+});
+
+addEventListener("fetch", (event) => {
+  const address = event.request.url.replace(/[?#].*$/, "").replace(/index\.html$/, "");
+  const kept = caches.open(NAME).then((cache) => cache.match(address));
+  event.respondWith(kept.then((answer) => answer ?? fetch(event.request)));
+});

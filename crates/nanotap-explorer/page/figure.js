@@ -3,8 +3,6 @@
 
 import { described, layout, paint, part, plain, value } from "./plot.js";
 
-export { part };
-
 const DRAG = 6;               // pixels beyond which a press is not a click
 const EDGE = 0.01;            // part of a panel by which a pointer may miss it
 const REACH = 14;             // pixels within which a drawn point is named

@@ -6,6 +6,7 @@ import { alone, bytes, current, save, stream, stop, superseded } from "./api.js"
 import { sameAs } from "./knobs.js";
 import * as figure from "./figure.js";
 import { moves } from "./lever.js";
+import { part } from "./plot.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = {
@@ -541,10 +542,10 @@ function nearest(place) {
   let best = null;
   let least = NEAR;
   for (const orbit of drawn?.clicks?.near ?? []) {
-    const across = Math.abs(figure.part(panel.x, orbit[0]) - u);
+    const across = Math.abs(part(panel.x, orbit[0]) - u);
     if (across >= least) continue;
     for (const height of orbit[1][panel.index] ?? []) {
-      const distance = Math.hypot(across, figure.part(panel.y, height) - v);
+      const distance = Math.hypot(across, part(panel.y, height) - v);
       if (distance < least) { least = distance; best = orbit; }
     }
   }

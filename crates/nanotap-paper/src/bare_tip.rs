@@ -6,7 +6,8 @@ use nanotap_dynamics::PeriodicOrbit;
 use nanotap_figures::{Figure, Panel};
 
 use super::PaperError;
-use super::check::{Check, Verdict, digits};
+use super::check::digits;
+use super::expected::Found;
 use super::motion_view::{KEY, View, empty_portrait};
 use super::runs::{Counted, Runs, how_many, stability};
 use super::section::{Picture, Section};
@@ -105,13 +106,13 @@ impl Bare {
         })
     }
 
+    /// Checks a number of motions of this period.
     fn check(
         &self,
-        id: &str,
-        paper: &str,
+        section: Section,
+        id: &'static str,
         period: usize,
-        claimed: usize,
-    ) -> Result<Check, PaperError> {
+    ) -> Result<Section, PaperError> {
         let stable = [&self.fast, &self.slow].map(|r| r.counted.stable(period).len());
         let all = [&self.fast, &self.slow]
             .map(|r| r.counted.stable(period).len() + r.unstable(period).len());
@@ -120,29 +121,23 @@ impl Bare {
             self.fast.describe(period)?,
             self.slow.describe(period)?
         );
-        Ok(Check::new(id, paper, here, verdict(claimed, stable, all))
-            .evidence(format!(
-                "Ω = 20, {}; Ω = 2.6, {}; {}",
-                self.fast.counted.summary(),
-                self.slow.counted.summary(),
-                self.fast.counted.missed()
-            ))
-            .rerun(self.fast.counted.rerun()))
+        let evidence = format!(
+            "Ω = 20, {}; Ω = 2.6, {}; {}",
+            self.fast.counted.summary(),
+            self.slow.counted.summary(),
+            self.fast.counted.missed()
+        );
+        let again = self.fast.counted.rerun();
+        Ok(section.check(id, found(stable, all), here, evidence, again))
     }
 }
 
-/// The verdict on `claimed` motions, given the numbers of `stable` motions and of `all` motions,
-/// unstable ones included, in two readings. Reproduced if a reading has all of them stable;
-/// ambiguous if only some are stable in the better reading; differs if none is.
-fn verdict(claimed: usize, stable: [usize; 2], all: [usize; 2]) -> Verdict {
-    let most = |counts: [usize; 2]| counts[0].max(counts[1]);
-    if most(stable) >= claimed {
-        Verdict::Reproduced
-    } else if most(stable) >= 1 && most(all) >= claimed {
-        Verdict::Ambiguous
-    } else {
-        Verdict::Differs
-    }
+/// The numbers of `stable` motions and of `all` motions, unstable ones included, of the better of two
+/// readings. Unstable motions count only next to a stable one.
+fn found(stable: [usize; 2], all: [usize; 2]) -> Found {
+    let most = |counts: [usize; 2]| counts[0].max(counts[1]) as f64;
+    let any = most(stable) >= 1.0;
+    Found::readings(most(stable), if any { most(all) } else { 0.0 })
 }
 
 /// The picture of up to two orbits.
@@ -192,7 +187,8 @@ pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         }
         _ => "the existing motions do not decide between the two",
     };
-    Ok(section
+    Ok(bare
+        .check(section, "fig15", 1)?
         .text(
             "The captions of Figs. 15–17 say Ω = 20; the text on them says Ω = 2.6. Section 4 also says once that α₁ = 0 \
              in Figs. 16 and 17 and once in Figs. 15–17; the captions say 15–17.",
@@ -206,28 +202,19 @@ pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
                 bare.slow.best(1).map(|o| (&bare.slow, o, 4)),
             ],
         )?)
-        .check(bare.check("fig15", "Fig. 15: two period-1 motions coexist with α₁ = 0", 1, 2)?)
         .check(
-            Check::new(
-                "fig15-omega",
-                "Figs. 15–17: Ω = 20 in the captions, Ω = 2.6 in the text",
-                reading,
-                Verdict::Ambiguous,
-            )
-            .evidence(format!("attractors at Ω = 20: {}; at Ω = 2.6: {}", kinds(&bare.fast), kinds(&bare.slow)))
-            .in_print()
-.rerun(bare.slow.counted.rerun()),
+            "fig15-omega",
+            (),
+            reading,
+            format!("attractors at Ω = 20: {}; at Ω = 2.6: {}", kinds(&bare.fast), kinds(&bare.slow)),
+            bare.slow.counted.rerun(),
         )
         .check(
-            Check::new(
-                "fig15-alpha1",
-                "section 4: α₁ = 0.1 in Figs. 5–15 and 0 in Figs. 16, 17; later α₁ = 0 in Figs. 15–17, as the captions say",
-                "α₁ = 0 is used for Figs. 15–17",
-                Verdict::Ambiguous,
-            )
-            .evidence("the paper contradicts itself; two of its three statements say 15–17")
-            .in_print()
-.rerun(bare.fast.counted.rerun()),
+            "fig15-alpha1",
+            (),
+            "α₁ = 0 is used for Figs. 15–17",
+            "the paper contradicts itself; two of its three statements say 15–17",
+            bare.fast.counted.rerun(),
         ))
 }
 
@@ -246,37 +233,29 @@ pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
             (&bare.fast, orbit, orbit.period, words)
         }
     };
-    let no_three = bare.slow.counted.stable(3).is_empty();
-    Ok(section
+    let three = bare.slow.counted.stable(3).len();
+    Ok(bare
+        .check(section, "fig16", 2)?
         .picture(picture(
             "fig16",
             "Is there a period-2 motion without a tip mass? (Fig. 16)",
             shown.3,
             &[Some((shown.0, shown.1, shown.2))],
         )?)
-        .check(bare.check(
-            "fig16",
-            "Fig. 16: a period-2 motion exists with α₁ = 0",
-            2,
-            1,
-        )?)
         .check(
-            Check::new(
-                "fig16-no-period-3",
-                "section 4: no period-3 motion was found for α₁ = 0 at Ω = 2.6",
-                if no_three {
-                    "none is stable here either"
-                } else {
-                    "one is stable"
-                },
-                Verdict::of(no_three),
-            )
-            .evidence(format!(
+            "fig16-no-period-3",
+            three,
+            if three == 0 {
+                "none is stable here either"
+            } else {
+                "one is stable"
+            },
+            format!(
                 "{}; {}",
                 bare.slow.counted.summary(),
                 bare.slow.counted.missed()
-            ))
-            .rerun(bare.slow.counted.rerun()),
+            ),
+            bare.slow.counted.rerun(),
         ))
 }
 
@@ -301,8 +280,9 @@ pub(super) fn fig17(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         rows.push(None);
     }
     let tip = runs.count(&Cantilever::paper())?;
-    let with_tip = tip.stable(4).is_empty();
-    Ok(section
+    let with_tip = tip.stable(4).len();
+    Ok(bare
+        .check(section, "fig17", 4)?
         .picture(picture(
             "fig17",
             "Period-4 motions without a tip mass at Ω = 20 (Fig. 17)",
@@ -321,30 +301,24 @@ pub(super) fn fig17(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
             ),
             &rows,
         )?)
-        .check(bare.check(
-            "fig17",
-            "Fig. 17: two period-4 motions coexist with α₁ = 0",
-            4,
-            2,
-        )?)
         .check(
-            Check::new(
-                "fig17-no-tip-mass",
-                "section 4: period-4 motion is not found for α₁ = 0.1 (at Ω = 2.6)",
-                how_many(tip.stable(4).len(), "stable period-4 motion"),
-                Verdict::of(with_tip),
-            )
-            .evidence(tip.summary())
-            .rerun(tip.rerun()),
+            "fig17-no-tip-mass",
+            with_tip,
+            how_many(with_tip, "stable period-4 motion"),
+            tip.summary(),
+            tip.rerun(),
         ))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::check::Verdict;
+    use super::super::expected::Expected::AtLeast;
     use super::*;
 
     #[test]
     fn two_claimed_motions_need_two_that_attract() {
+        let verdict = |claimed, stable, all| AtLeast(claimed).verdict(&found(stable, all));
         assert_eq!(verdict(2, [2, 0], [2, 0]), Verdict::Reproduced);
         // One is stable, its saddle partner is not: the paper may show either.
         assert_eq!(verdict(2, [1, 0], [2, 0]), Verdict::Ambiguous);

@@ -5,7 +5,6 @@ use nanotap_figures::{
     Axis, Band, Colour, Dash, Figure, Legend, Line, Markers, Panel, Rule, Shape,
 };
 
-use super::check::{Check, Verdict};
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::frequency_sweep::{Column, Kind, draw, spaced, stretches, sweep, where_seen};
 use super::runs::{Runs, SEED};
@@ -97,14 +96,26 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
         ),
     );
     let beyond = sweep(runs, &subject, OMEGA, &inside_the_tori(&one), starts.max(4))?;
-    let checks = [
-        subharmonics(&wide, [&one, &two], &again),
-        nonperiodic_window(&window, &close, &window_again),
-        further(&wide, &beyond, &one, &branch_again),
-        period_three(&wide, &again),
-        coexistence(&wide, &again),
-    ];
-    let mut section = section
+    let section = subharmonics(section, &wide, [&one, &two], &again);
+    let section = nonperiodic_window(section, &window, &close, &window_again);
+    let section = further(section, &wide, &beyond, &one, &branch_again);
+    let three = |c: &Column| c.has(Kind::Periodic(3));
+    let several = |c: &Column| c.motions.len() > 1;
+    Ok(section
+        .check(
+            "fig5-period-3",
+            count_of(&wide, three),
+            format!("period 3 is stable at Ω = {}", where_seen(&wide, three)),
+            "none is stable at Ω = 2.6, the frequency of Fig. 7 (see there)",
+            &again,
+        )
+        .check(
+            "fig5-coexistence",
+            count_of(&wide, several),
+            format!("more than one motion is stable at Ω = {}", where_seen(&wide, several)),
+            "found from a limited number of initial states per value; further motions may exist",
+            &again,
+        )
         .text(
             "At each drive frequency several initial states are followed until their motions are classified. Each motion gives \
              one point per drive period: the largest tip deflection in that period. The line is the period-1 branch, stable \
@@ -113,11 +124,12 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
         .picture(picture(&wide, &close, [&one, &two], starts))
         .table(one.table("Bifurcations of the period-1 branch"))
         .table(two.table("Bifurcations of the period-2 branch around Ω = 2.6"))
-        .table(table);
-    for check in checks {
-        section = section.check(check);
-    }
-    Ok(section)
+        .table(table))
+}
+
+/// Number of frequencies with this property.
+fn count_of(columns: &[Column], property: impl Fn(&Column) -> bool) -> usize {
+    columns.iter().filter(|c| property(c)).count()
 }
 
 fn numbers(values: &[f64]) -> String {
@@ -132,33 +144,42 @@ fn numbers(values: &[f64]) -> String {
 }
 
 /// "Period-1 and period-2 bifurcations are shown."
-fn subharmonics(wide: &[Column], [branch, doubled]: [&FollowedBranch; 2], again: &str) -> Check {
+fn subharmonics(
+    section: Section,
+    wide: &[Column],
+    [branch, doubled]: [&FollowedBranch; 2],
+    again: &str,
+) -> Section {
     let (one, two) = (Kind::Periodic(1), Kind::Periodic(2));
     let holds = wide.iter().any(|c| c.has(one))
         && wide.iter().any(|c| c.has(two))
         && !branch.flips().is_empty();
-    Check::new(
+    section.check(
         "fig5-periods-1-2",
-        "Fig. 5: period-1 and period-2 motions and their bifurcations",
+        holds,
         format!(
             "period 1 is stable at Ω = {}; period 2 at Ω = {}",
             where_seen(wide, |c| c.has(one)),
             where_seen(wide, |c| c.has(two))
         ),
-        Verdict::of(holds),
+        format!(
+            "the period-1 branch doubles its period at Ω = {}; the period-2 branch around Ω = 2.6 is stable at {}",
+            numbers(&branch.flips()),
+            in_words(&doubled.attracting())
+        ),
+        again,
     )
-    .evidence(format!(
-        "the period-1 branch doubles its period at Ω = {}; the period-2 branch around Ω = 2.6 is stable at {}",
-        numbers(&branch.flips()),
-        in_words(&doubled.attracting())
-    ))
-    .rerun(again)
 }
 
 /// "In 2.0 ≤ Ω ≤ 2.15 nonperiodic motions evolving from period-2 are observed."
-fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check {
+fn nonperiodic_window(
+    section: Section,
+    window: &[Column],
+    close: &[Column],
+    again: &str,
+) -> Section {
     let nonperiodic = |c: &Column| c.motions.iter().any(|m| m.kind.is_nonperiodic());
-    let inside = window.iter().filter(|c| nonperiodic(c)).count();
+    let inside = count_of(window, nonperiodic);
     let kinds: Vec<String> = stretches(window)
         .iter()
         .map(|(f, t, k)| {
@@ -168,23 +189,23 @@ fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check
             )
         })
         .collect();
-    Check::new(
+    section.check(
         "fig5-window",
-        "section 4: for 2.0 ≤ Ω ≤ 2.15 nonperiodic motions evolve from period 2",
+        inside,
         format!("nonperiodic at {inside} of {} values of Ω ({})", window.len(), kinds.join("; ")),
-        Verdict::of(inside > 0),
+        format!(
+            "such motions exist at other frequencies: near Ω = 2.6 nonperiodic motion at {}, period 2 at {}",
+            where_seen(close, nonperiodic),
+            where_seen(close, |c| c.has(Kind::Periodic(2)))
+        ),
+        again,
     )
-    .evidence(format!(
-        "such motions exist at other frequencies: near Ω = 2.6 nonperiodic motion at {}, period 2 at {}",
-        where_seen(close, nonperiodic),
-        where_seen(close, |c| c.has(Kind::Periodic(2)))
-    ))
-    .rerun(again)
 }
 
 /// Frequencies slightly beyond the Neimark–Sacker points above the paper's window, on the side
 /// where the period-1 orbit is unstable.
 fn inside_the_tori(branch: &FollowedBranch) -> Vec<f64> {
+    /// Distance from a Neimark–Sacker point, as a part of the distance to the next one.
     const BEYOND: f64 = 0.15;
     let tori: Vec<f64> = branch
         .tori()
@@ -200,7 +221,13 @@ fn inside_the_tori(branch: &FollowedBranch) -> Vec<f64> {
 }
 
 /// "If the driving frequency further increases, nonperiodic motions will evolve from period-1."
-fn further(wide: &[Column], beyond: &[Column], branch: &FollowedBranch, again: &str) -> Check {
+fn further(
+    section: Section,
+    wide: &[Column],
+    beyond: &[Column],
+    branch: &FollowedBranch,
+    again: &str,
+) -> Section {
     let tori: Vec<f64> = branch
         .tori()
         .into_iter()
@@ -212,54 +239,21 @@ fn further(wide: &[Column], beyond: &[Column], branch: &FollowedBranch, again: &
     let seen = columns
         .iter()
         .any(|c| c.at > WINDOW.1 && c.has(Kind::Torus));
-    Check::new(
+    section.check(
         "fig5-further",
-        "section 4: if the driving frequency further increases, nonperiodic motions evolve from period-1 motions",
+        !tori.is_empty() && seen,
         if tori.is_empty() {
             "the period-1 branch has no Neimark–Sacker bifurcation above Ω = 2.15 in the range drawn".to_owned()
         } else {
             format!("tori bifurcate from the period-1 branch at Ω = {}", numbers(&tori))
         },
-        Verdict::of(!tori.is_empty() && seen),
-    )
-    .evidence(format!(
-        "quasi-periodic motion at Ω = {}; chaos at Ω = {}",
-        where_seen(&columns, |c| c.has(Kind::Torus)),
-        where_seen(wide, |c| c.has(Kind::Chaos))
-    ))
-    .rerun(again)
-}
-
-/// "Other subharmonic motion like period-3 exists, which is not shown."
-fn period_three(wide: &[Column], again: &str) -> Check {
-    let three = Kind::Periodic(3);
-    Check::new(
-        "fig5-period-3",
-        "section 4: other subharmonics like period 3 exist, which Fig. 5 does not show",
         format!(
-            "period 3 is stable at Ω = {}",
-            where_seen(wide, |c| c.has(three))
+            "quasi-periodic motion at Ω = {}; chaos at Ω = {}",
+            where_seen(&columns, |c| c.has(Kind::Torus)),
+            where_seen(wide, |c| c.has(Kind::Chaos))
         ),
-        Verdict::of(wide.iter().any(|c| c.has(three))),
+        again,
     )
-    .evidence("none is stable at Ω = 2.6, the frequency of Fig. 7 (see there)")
-    .rerun(again)
-}
-
-/// "Several period-n motions coexist at one driving frequency."
-fn coexistence(wide: &[Column], again: &str) -> Check {
-    let several = |c: &Column| c.motions.len() > 1;
-    Check::new(
-        "fig5-coexistence",
-        "section 4: several period-n motions coexist at one driving frequency",
-        format!(
-            "more than one motion is stable at Ω = {}",
-            where_seen(wide, several)
-        ),
-        Verdict::of(wide.iter().any(several)),
-    )
-    .evidence("found from a limited number of initial states per value; further motions may exist")
-    .rerun(again)
 }
 
 fn picture(

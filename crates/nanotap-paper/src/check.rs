@@ -68,47 +68,6 @@ pub struct Check {
     pub rerun: String,
 }
 
-impl Check {
-    /// Creates a statement with its verdict, without evidence and command.
-    pub fn new(
-        id: impl Into<String>,
-        paper: impl Into<String>,
-        here: impl Into<String>,
-        verdict: Verdict,
-    ) -> Self {
-        Self {
-            id: id.into(),
-            paper: paper.into(),
-            here: here.into(),
-            about: About::Motion,
-            verdict,
-            evidence: String::new(),
-            rerun: String::new(),
-        }
-    }
-
-    /// Sets the evidence for the verdict, in words.
-    #[must_use]
-    pub fn evidence(mut self, evidence: impl Into<String>) -> Self {
-        self.evidence = evidence.into();
-        self
-    }
-
-    /// Marks the statement as one about a formula, a number or a caption as printed.
-    #[must_use]
-    pub fn in_print(mut self) -> Self {
-        self.about = About::Print;
-        self
-    }
-
-    /// Sets the command line that reproduces the result.
-    #[must_use]
-    pub fn rerun(mut self, rerun: impl Into<String>) -> Self {
-        self.rerun = rerun.into();
-        self
-    }
-}
-
 /// Whether `value`, rounded to `decimals` decimals, equals the `printed` number.
 pub(super) fn rounds_to(value: f64, printed: f64, decimals: i32) -> bool {
     // A thousandth of a unit allows for the binary form of the printed number.

@@ -1,7 +1,7 @@
 //! Fig. 2f: does another part of the beam than its tip touch the sample? The paper assumes that it
 //! does not and states that its cases were chosen accordingly.
 
-use super::check::{Check, Verdict, digits};
+use super::check::digits;
 use super::damped_limit::response;
 use super::runs::Runs;
 use super::section::{Section, Table};
@@ -138,14 +138,11 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
              the sample by its whole length, the end of the beam touches the sample.",
         )
         .check(
-            Check::new(
-                "fig2f",
-                "section 2: driving frequency, amplitude and parameters were chosen and examined so that only the tip touches",
-                here,
-                Verdict::of(touching.is_empty()),
-            )
-            .evidence("least height over the whole beam and the whole motion, from the closed form (table)")
-            .rerun(again),
+            "fig2f",
+            touching.len(),
+            here,
+            "least height over the whole beam and the whole motion, from the closed form (table)",
+            again,
         )
         .table(table))
 }

@@ -1,6 +1,7 @@
 //! The numbers of Eqs. (7), (14), (23), (25) and of section 4's ten samples.
 
-use super::check::{Check, Verdict, digits, rounds_to};
+use super::check::digits;
+use super::expected::agree;
 use super::runs::Runs;
 use super::section::{Section, Table};
 use super::{PaperError, rerun};
@@ -21,7 +22,6 @@ pub(super) fn damping_units(_: &Runs<'_>, section: Section) -> Result<Section, P
     };
     let printed = lever.in_grams().alpha3_printed() / lever.alpha3_printed();
     let corrected = lever.in_grams().alpha3_corrected() / lever.alpha3_corrected();
-    let pure = |ratio: f64| (ratio - 1.0).abs() < 1e-9;
     Ok(section
         .text(
             "A dimensionless parameter must not change when the same lever is described in other units. \
@@ -29,19 +29,15 @@ pub(super) fn damping_units(_: &Runs<'_>, section: Section) -> Result<Section, P
              and it is what turns Eq. (3) into Eq. (6).",
         )
         .check(
-            Check::new(
-                "eq7",
-                "Eq. (7): α₃ = C√(L⁴/EI), α₆ = (C₁/L)√(L⁴/EI)",
-                "α₃ = C√(L⁴/(m EI)), α₆ = (C₁/L)√(L⁴/(m EI))",
-                Verdict::of(pure(printed)),
-            )
-            .evidence(format!(
+            "eq7",
+            printed,
+            "α₃ = C√(L⁴/(m EI)), α₆ = (C₁/L)√(L⁴/(m EI))",
+            format!(
                 "the same lever in grams instead of kilograms multiplies the printed α₃ by {}, the corrected one by {}",
                 digits(printed, 4),
                 digits(corrected, 4)
-            ))
-            .in_print()
-.rerun(rerun::section("eq7")),
+            ),
+            rerun::section("eq7"),
         ))
 }
 
@@ -118,13 +114,14 @@ pub(super) fn cosine_term(runs: &Runs<'_>, section: Section) -> Result<Section, 
              Eq. (6); this section compares it with the printed form.",
         )
         .check(
-            Check::new("eq14", "Eq. (14): … − α₂ α₃ ∫φ_i cos Ωτ", here, Verdict::Differs)
-                .evidence(format!(
-                    "as printed, Eq. (14) contradicts Eq. (6); attractors of both forms: {}",
-                    table.rows.iter().map(|r| format!("Ω = {}, α₁ = {}: {} | {}", r[1], r[2], r[3], r[4])).collect::<Vec<_>>().join("; ")
-                ))
-                .in_print()
-.rerun(rerun::on_case("attractors", &printed_case, "--starts 64 --seed 1")),
+            "eq14",
+            (),
+            here,
+            format!(
+                "as printed, Eq. (14) contradicts Eq. (6); attractors of both forms: {}",
+                table.rows.iter().map(|r| format!("Ω = {}, α₁ = {}: {} | {}", r[1], r[2], r[3], r[4])).collect::<Vec<_>>().join("; ")
+            ),
+            rerun::on_case("attractors", &printed_case, "--starts 64 --seed 1"),
         )
         .table(table))
 }
@@ -132,21 +129,16 @@ pub(super) fn cosine_term(runs: &Runs<'_>, section: Section) -> Result<Section, 
 /// Computes the section on Eq. (23): frequencies of the bare beam.
 pub(super) fn bare_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let exact = exact_beam::frequencies(0.0, 0.0, 3).map_err(nanotap::model::ModelError::from)?;
-    let printed = [(3.52, 2), (22.03, 2), (61.7, 1)];
-    let holds = agree(&exact, &printed);
     let bare = Cantilever::paper()
         .with(Parameter::Alpha1, 0.0)
         .with(Parameter::Alpha4, 0.0);
+    let here = list(&exact, 7);
     Ok(section.check(
-        Check::new(
-            "eq23",
-            "Eq. (23): ω₀₁ = 3.52, ω₀₂ = 22.03, ω₀₃ = 61.7",
-            list(&exact, 7),
-            Verdict::of(holds),
-        )
-        .evidence("squares of the roots of cos β cosh β = −1, to the last bit")
-        .in_print()
-        .rerun(rerun::on_case("modes", &bare, "")),
+        "eq23",
+        exact,
+        here,
+        "squares of the roots of cos β cosh β = −1, to the last bit",
+        rerun::on_case("modes", &bare, ""),
     ))
 }
 
@@ -171,7 +163,7 @@ pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Sect
         let contact = table_of(modes)?.contact;
         let agrees = modes >= 3 && agree(&contact, &EQ25);
         if agrees {
-            agreeing.push(modes);
+            agreeing.push(modes.to_string());
         }
         if modes == 3 {
             three.clone_from(&contact);
@@ -207,74 +199,53 @@ pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Sect
     let with_tip = &last.exact_free;
     let trend = exact[0] > 1.5 * bare[0] && exact[1] < bare[1] && exact[2] < bare[2];
     let five = Cantilever::paper_eq24().with_modes(5);
-    let names: Vec<String> = agreeing.iter().map(ToString::to_string).collect();
     Ok(section
         .text(
             "The Galerkin frequencies fall towards those of the beam as modes are added, so the printed digits show \
              how many modes were used.",
         )
         .check(
-            Check::new(
-                "eq25",
-                "Eq. (25): ω₁ = 7.79, ω₂ = 20.33, ω₃ = 55.81",
-                if agreeing.is_empty() {
-                    format!("no N up to {MAX_MODES} gives all three")
-                } else {
-                    format!("these digits belong to N = {}", names.join(", "))
-                },
-                Verdict::of(!agreeing.is_empty()),
-            )
-            .evidence(format!("N = 1 … {MAX_MODES} compared digit by digit (table)"))
-            .in_print()
-.rerun(rerun::on_case("modes", &five, "")),
+            "eq25",
+            agreeing.len(),
+            if agreeing.is_empty() {
+                format!("no N up to {MAX_MODES} gives all three")
+            } else {
+                format!("these digits belong to N = {}", agreeing.join(", "))
+            },
+            format!("N = 1 … {MAX_MODES} compared digit by digit (table)"),
+            rerun::on_case("modes", &five, ""),
         )
         .check(
-            Check::new(
-                "eq25-modes",
-                "section 3 studies N = 1 … 4 and does not say how many modes Eq. (25) has",
-                format!("N = 3 gives {}, the beam itself {}", list(&three, 5), list(exact, 8)),
-                Verdict::Ambiguous,
-            )
-            .evidence(format!(
+            "eq25-modes",
+            (),
+            format!("N = 3 gives {}, the beam itself {}", list(&three, 5), list(exact, 8)),
+            format!(
                 "the third frequency is {:.2} % too high with N = 3 and {:.2} % in print",
                 100.0 * (three[2] / exact[2] - 1.0),
                 100.0 * (EQ25[2].0 / exact[2] - 1.0)
-            ))
-            .in_print()
-.rerun(rerun::on_case("modes", &Cantilever::paper_eq24(), "")),
+            ),
+            rerun::on_case("modes", &Cantilever::paper_eq24(), ""),
         )
         .check(
-            Check::new(
-                "eq25-trend",
-                "compared with Eq. (23), ω₁ increases dramatically while ω₂ and ω₃ reduce",
-                format!(
-                    "ω₁ rises from {} to {}, ω₂ falls from {} to {}, ω₃ from {} to {}",
-                    digits(bare[0], 4),
-                    digits(exact[0], 4),
-                    digits(bare[1], 4),
-                    digits(exact[1], 4),
-                    digits(bare[2], 4),
-                    digits(exact[2], 4)
-                ),
-                Verdict::of(trend),
-            )
-            .evidence(format!(
+            "eq25-trend",
+            trend,
+            format!(
+                "ω₁ rises from {} to {}, ω₂ falls from {} to {}, ω₃ from {} to {}",
+                digits(bare[0], 4),
+                digits(exact[0], 4),
+                digits(bare[1], 4),
+                digits(exact[1], 4),
+                digits(bare[2], 4),
+                digits(exact[2], 4)
+            ),
+            format!(
                 "the tip mass lowers them, not the contact: in free flight with α₁ = 0.1 they are {}, each below its \
                  value in contact",
                 list(with_tip, 4)
-            ))
-            .rerun(rerun::on_case("modes", &Cantilever::paper_eq24(), "")),
+            ),
+            rerun::on_case("modes", &Cantilever::paper_eq24(), ""),
         )
         .table(table))
-}
-
-/// Whether every number rounds to its printed form.
-fn agree(values: &[f64], printed: &[(f64, i32)]) -> bool {
-    values.len() >= printed.len()
-        && values
-            .iter()
-            .zip(printed)
-            .all(|(v, (p, decimals))| rounds_to(*v, *p, *decimals))
 }
 
 fn list(values: &[f64], significant: usize) -> String {
@@ -350,27 +321,22 @@ pub(super) fn samples(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
              checked.",
         )
         .check(
-            Check::new(
-                "alpha4-samples",
-                "section 4: α₄ from 4.7×10⁻³ (1 MPa) to 233.5 (50 GPa); 18.7 for polystyrene (4 GPa), 23.4 for \
-                 graphite (5 GPa), tip of E₁ = 130 GPa, ν₁ = 0.27",
-                if rigid {
-                    format!(
-                        "the four numbers are proportional to E₂ (α₄ = {} E₂/GPa), as for a rigid tip",
-                        digits(1e9 * 0.5 * (low + high), 3)
-                    )
-                } else {
-                    "the four numbers are not even proportional to E₂".to_owned()
-                },
-                Verdict::of(fits),
-            )
-            .evidence(format!(
+            "alpha4-samples",
+            fits,
+            if rigid {
+                format!(
+                    "the four numbers are proportional to E₂ (α₄ = {} E₂/GPa), as for a rigid tip",
+                    digits(1e9 * 0.5 * (low + high), 3)
+                )
+            } else {
+                "the four numbers are not even proportional to E₂".to_owned()
+            },
+            format!(
                 "with the tip's stated compliance no ν₂ from 0 to 0.5 fits all four; scaled from polystyrene at \
                  ν₂ = 0.3, 50 GPa has α₄ = {} instead of 233.5",
                 digits(scaled(Some(SILICON), 50e9), 4)
-            ))
-            .in_print()
-.rerun(rerun::section("alpha4")),
+            ),
+            rerun::section("alpha4"),
         )
         .table(table))
 }
@@ -414,18 +380,15 @@ pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         .fold(0.0, f64::max)
         / size;
     Ok(section.check(
-        Check::new(
-            "scaling",
-            "section 3: the eigenfrequency of this intermittent contact system is amplitude-independent",
-            "with α₅ = 0 the whole motion scales: three times the drive and the initial state give three times the motion",
-            Verdict::of(difference < 1e-12),
-        )
-        .evidence(format!(
+        "scaling",
+        difference,
+        "with α₅ = 0 the whole motion scales: three times the drive and the initial state give three times the motion",
+        format!(
             "P(3x; 3α₂) and 3P(x; α₂) differ by {} of their size after a period with contact; with a gap (α₅ ≠ 0) \
              only α₅/α₂ matters",
             digits(difference, 1)
-        ))
-        .rerun(rerun::section("scaling")),
+        ),
+        rerun::section("scaling"),
     ))
 }
 

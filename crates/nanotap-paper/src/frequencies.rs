@@ -2,7 +2,7 @@
 
 use nanotap_figures::{Axis, Figure, Line, Panel, Rule};
 
-use super::check::{Check, Verdict, digits};
+use super::check::digits;
 use super::runs::Runs;
 use super::section::{Picture, Section};
 use super::{PaperError, rerun};
@@ -14,6 +14,7 @@ use nanotap::study::modes::ModeTable;
 
 /// Computes the section on Fig. 2e: the first three mode shapes.
 pub(super) fn mode_shapes(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
+    /// Number of points of a mode shape.
     const POINTS: usize = 401;
     let beam =
         Modes::new(3).map_err(|e| nanotap::model::ModelError::from(CantileverError::from(e)))?;
@@ -29,16 +30,15 @@ pub(super) fn mode_shapes(_: &Runs<'_>, section: Section) -> Result<Section, Pap
         panel = panel.with(Line::new(shape).label(format!("mode {}", mode.number)));
     }
     // A clamped-free mode j has j − 1 nodes between its ends.
-    let nodes: Vec<usize> = beam
+    let nodes: Vec<f64> = beam
         .iter()
         .map(|mode| {
             let value = |k: usize| mode.shape(k as f64 / 1000.0);
             (20..1000)
                 .filter(|&k| (value(k) > 0.0) != (value(k + 1) > 0.0))
-                .count()
+                .count() as f64
         })
         .collect();
-    let holds = nodes == [0, 1, 2];
     Ok(section
         .picture(Picture::new(
             "fig02e",
@@ -49,14 +49,11 @@ pub(super) fn mode_shapes(_: &Runs<'_>, section: Section) -> Result<Section, Pap
             80.0,
         ))
         .check(
-            Check::new(
-                "fig2e",
-                "Fig. 2e: the lowest three mode shapes of a cantilever",
-                format!("drawn from their closed form; nodes: {}, {}, {}", nodes[0], nodes[1], nodes[2]),
-                Verdict::of(holds),
-            )
-            .evidence("mode j of a clamped-free beam has j − 1 nodes, and ∫φ_iφ_j = δ_ij")
-            .rerun(rerun::on_case("modes", &Cantilever::paper(), "--plot modes.svg")),
+            "fig2e",
+            nodes.clone(),
+            format!("drawn from their closed form; nodes: {}, {}, {}", nodes[0], nodes[1], nodes[2]),
+            "mode j of a clamped-free beam has j − 1 nodes, and ∫φ_iφ_j = δ_ij",
+            rerun::on_case("modes", &Cantilever::paper(), "--plot modes.svg"),
         ))
 }
 
@@ -104,7 +101,6 @@ pub(super) fn maps(_: &Runs<'_>, section: Section) -> Result<Section, PaperError
         }
     }
     let spread = ranges.map(|(low, high)| high / low);
-    let holds = spread[0] > spread[1];
     let three = ModeTable::new(&Cantilever::paper())
         .map_err(PaperError::failed("the frequencies in contact"))?;
     let paper = at(0.1, 20.0)?;
@@ -128,23 +124,20 @@ pub(super) fn maps(_: &Runs<'_>, section: Section) -> Result<Section, PaperError
             72.0,
         ))
         .check(
-            Check::new(
-                "fig3-influence",
-                "Fig. 3: α₁ and α₄ have larger influence on the first natural frequency",
-                format!(
-                    "over the ranges drawn, ω₁/ω₀₁ varies by a factor {}, ω₂/ω₀₂ by {}",
-                    digits(spread[0], 3),
-                    digits(spread[1], 3)
-                ),
-                Verdict::of(holds),
-            )
-            .evidence(format!(
+            "fig3-influence",
+            spread[0] / spread[1],
+            format!(
+                "over the ranges drawn, ω₁/ω₀₁ varies by a factor {}, ω₂/ω₀₂ by {}",
+                digits(spread[0], 3),
+                digits(spread[1], 3)
+            ),
+            format!(
                 "at α₁ = 0.1, α₄ = 20: ω₁/ω₀₁ = {}, ω₂/ω₀₂ = {} (three modes: {}, {})",
                 digits(paper[0] / bare[0], 5),
                 digits(paper[1] / bare[1], 5),
                 digits(three.contact[0] / bare[0], 5),
                 digits(three.contact[1] / bare[1], 5)
-            ))
-            .rerun(rerun::on_case("modes", &Cantilever::paper().with(Parameter::Alpha4, 20.0), "")),
+            ),
+            rerun::on_case("modes", &Cantilever::paper().with(Parameter::Alpha4, 20.0), ""),
         ))
 }

@@ -167,13 +167,20 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Verdict;
+    use super::super::{About, Verdict};
     use super::*;
 
     #[test]
     fn what_is_written_cannot_break_the_page() {
-        let check = Check::new("a\"b", "x < y & z", "|μ| > 1", Verdict::Differs)
-            .rerun("nanotap --set a=<b>");
+        let check = Check {
+            id: "a\"b".into(),
+            paper: "x < y & z".into(),
+            here: "|μ| > 1".into(),
+            about: About::Motion,
+            verdict: Verdict::Differs,
+            evidence: String::new(),
+            rerun: "nanotap --set a=<b>".into(),
+        };
         let html = statement(&check);
         assert!(html.contains("x &lt; y &amp; z") && html.contains("|μ| &gt; 1"));
         assert!(html.contains("id=\"check-a&quot;b\"") && html.contains("--set a=&lt;b&gt;"));

@@ -22,6 +22,7 @@ mod clearance;
 mod convergence_study;
 mod damped_limit;
 mod equations;
+mod expected;
 mod fast_drive;
 mod followed_branch;
 mod frequencies;
@@ -34,6 +35,7 @@ mod rerun;
 mod runs;
 mod section;
 mod slow_drive;
+mod statements;
 mod time_step;
 mod write;
 
@@ -45,6 +47,7 @@ use nanotap::case::near_name::near_name;
 pub use check::{About, Check, Verdict};
 use runs::Runs;
 pub use section::{Picture, Section, Table};
+use statements::{TOPICS, Topic};
 pub use write::{Document, Written};
 
 /// Options of the report: its sections and the effort.
@@ -150,175 +153,6 @@ impl Report {
     }
 }
 
-/// A section's name, its heading, and the function that computes it.
-struct Topic {
-    id: &'static str,
-    title: &'static str,
-    /// Approximate time in seconds on two cores.
-    weight: u32,
-    make: fn(&Runs<'_>, Section) -> Result<Section, PaperError>,
-}
-
-/// All sections, in the order of the paper; evidence for several sections comes last.
-const TOPICS: &[Topic] = &[
-    Topic {
-        id: "eq7",
-        title: "Eq. (7): the damping parameters",
-        weight: 1,
-        make: equations::damping_units,
-    },
-    Topic {
-        id: "eq14",
-        title: "Eq. (14): the drive's cosine term",
-        weight: 6,
-        make: equations::cosine_term,
-    },
-    Topic {
-        id: "eq23",
-        title: "Eq. (23): frequencies of the bare beam",
-        weight: 1,
-        make: equations::bare_frequencies,
-    },
-    Topic {
-        id: "eq25",
-        title: "Eq. (25): frequencies in contact",
-        weight: 1,
-        make: equations::contact_frequencies,
-    },
-    Topic {
-        id: "alpha4",
-        title: "Section 4: contact stiffness of ten samples",
-        weight: 1,
-        make: equations::samples,
-    },
-    Topic {
-        id: "scaling",
-        title: "Section 3: amplitude-independent frequencies",
-        weight: 1,
-        make: equations::scaling,
-    },
-    Topic {
-        id: "fig2e",
-        title: "Fig. 2e: the first three modes",
-        weight: 1,
-        make: frequencies::mode_shapes,
-    },
-    Topic {
-        id: "fig2f",
-        title: "Fig. 2f: contact of other parts of the beam",
-        weight: 2,
-        make: clearance::section,
-    },
-    Topic {
-        id: "fig3",
-        title: "Fig. 3: frequencies against tip mass and contact stiffness",
-        weight: 1,
-        make: frequencies::maps,
-    },
-    Topic {
-        id: "fig4",
-        title: "Fig. 4: number of modes needed at Ω = 4.1",
-        weight: 2,
-        make: convergence_study::section,
-    },
-    Topic {
-        id: "fig5",
-        title: "Fig. 5: the bifurcation diagram",
-        weight: 25,
-        make: bifurcation_diagram::section,
-    },
-    Topic {
-        id: "fig6",
-        title: "Fig. 6: two period-1 motions at Ω = 2.6, α₁ = 0.1",
-        weight: 6,
-        make: slow_drive::fig6,
-    },
-    Topic {
-        id: "fig7",
-        title: "Fig. 7: period 2 and period 3 at Ω = 2.6, α₁ = 0.1",
-        weight: 1,
-        make: slow_drive::fig7,
-    },
-    Topic {
-        id: "fig8",
-        title: "Fig. 8: a period-1 motion at Ω = 20, α₁ = 0.1",
-        weight: 20,
-        make: fast_drive::fig8,
-    },
-    Topic {
-        id: "fig9",
-        title: "Fig. 9: another period-1 motion at Ω = 20, α₁ = 0.1",
-        weight: 1,
-        make: fast_drive::fig9,
-    },
-    Topic {
-        id: "fig10",
-        title: "Fig. 10: period 11 at Ω = 20, α₁ = 0.1",
-        weight: 1,
-        make: fast_drive::fig10,
-    },
-    Topic {
-        id: "fig11",
-        title: "Fig. 11: period 28 at Ω = 20, α₁ = 0.1",
-        weight: 1,
-        make: fast_drive::fig11,
-    },
-    Topic {
-        id: "fig12",
-        title: "Fig. 12: period 21 at Ω = 20, α₁ = 0.1",
-        weight: 1,
-        make: fast_drive::fig12,
-    },
-    Topic {
-        id: "fig13",
-        title: "Fig. 13: another period 21 at Ω = 20, α₁ = 0.1",
-        weight: 1,
-        make: fast_drive::fig13,
-    },
-    Topic {
-        id: "fig14",
-        title: "Fig. 14: a nonperiodic motion at Ω = 20, α₁ = 0.1",
-        weight: 1,
-        make: fast_drive::fig14,
-    },
-    Topic {
-        id: "fig15",
-        title: "Fig. 15: two period-1 motions with α₁ = 0",
-        weight: 1,
-        make: bare_tip::fig15,
-    },
-    Topic {
-        id: "fig16",
-        title: "Fig. 16: period 2 with α₁ = 0",
-        weight: 1,
-        make: bare_tip::fig16,
-    },
-    Topic {
-        id: "fig17",
-        title: "Fig. 17: two period-4 motions with α₁ = 0",
-        weight: 1,
-        make: bare_tip::fig17,
-    },
-    Topic {
-        id: "impact",
-        title: "Fig. 1: rigid and soft stops",
-        weight: 15,
-        make: impact::section,
-    },
-    Topic {
-        id: "attractors",
-        title: "Evidence: all attractors, N = 1 … 5",
-        weight: 15,
-        make: attractors::section,
-    },
-    Topic {
-        id: "time-step",
-        title: "Evidence: artefacts of fixed time steps",
-        weight: 1,
-        make: time_step::section,
-    },
-];
-
 /// Computes the report. Progress is reported in percent of the whole.
 ///
 /// # Errors
@@ -355,7 +189,7 @@ pub fn report_so_far(
             all = false;
             break;
         }
-        sections.push(made?);
+        sections.push(made?.with_checks(topic.statements)?);
         begun += topic.weight;
     }
     let quick = options.quick;
@@ -421,6 +255,17 @@ mod tests {
     }
 
     #[test]
+    fn statements_have_names_of_their_own_that_begin_with_the_section() {
+        let mut ids = std::collections::BTreeSet::new();
+        for topic in TOPICS {
+            for statement in topic.statements {
+                assert!(names(statement.id, topic), "{}", statement.id);
+                assert!(ids.insert(statement.id), "{}", statement.id);
+            }
+        }
+    }
+
+    #[test]
     fn unknown_sections_are_refused_with_the_nearest() {
         let error = chosen(&["fgi4".to_owned()]).err().unwrap().to_string();
         assert!(
@@ -457,22 +302,7 @@ mod tests {
         for check in report.checks() {
             assert!(!check.evidence.is_empty(), "{}", check.id);
             assert!(check.rerun.starts_with("nanotap "), "{}", check.id);
-            assert!(
-                names(&check.id, section_of(&report, &check.id)),
-                "{}",
-                check.id
-            );
         }
-    }
-
-    /// The topic of the section that contains a check.
-    fn section_of(report: &Report, id: &str) -> &'static Topic {
-        let section = report
-            .sections
-            .iter()
-            .find(|s| s.checks.iter().any(|c| c.id == id))
-            .unwrap();
-        TOPICS.iter().find(|t| t.id == section.id).unwrap()
     }
 
     #[test]

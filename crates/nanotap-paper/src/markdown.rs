@@ -45,16 +45,24 @@ fn cell(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Check, Report, Section, Verdict};
+    use super::super::{About, Check, Report, Section, Verdict};
     use super::*;
 
     #[test]
     fn every_row_has_six_cells() {
-        let check = Check::new("x", "|μ| = 1", "a | b", Verdict::Ambiguous)
-            .evidence("E*")
-            .rerun("nanotap");
+        let check = Check {
+            id: "x".into(),
+            paper: "|μ| = 1".into(),
+            here: "a | b".into(),
+            about: About::Motion,
+            verdict: Verdict::Ambiguous,
+            evidence: "E*".into(),
+            rerun: "nanotap".into(),
+        };
+        let mut section = Section::new("x", "X");
+        section.checks.push(check);
         let report = Report {
-            sections: vec![Section::new("x", "X").check(check)],
+            sections: vec![section],
             quick: true,
         };
         let text = document(&report);

@@ -2,7 +2,10 @@
 
 use nanotap_figures::{DOUBLE_COLUMN, Figure};
 
+use super::PaperError;
 use super::check::Check;
+use super::expected::Found;
+use super::statements::Statement;
 
 /// A part of the report.
 #[derive(Clone, Debug)]
@@ -19,6 +22,17 @@ pub struct Section {
     pub pictures: Vec<Picture>,
     /// Statements of the paper with their verdicts.
     pub checks: Vec<Check>,
+    findings: Vec<Finding>,
+}
+
+/// What a computation gave for a statement, in numbers and in words.
+#[derive(Clone, Debug)]
+struct Finding {
+    id: &'static str,
+    found: Found,
+    here: String,
+    evidence: String,
+    rerun: String,
 }
 
 impl Section {
@@ -31,6 +45,7 @@ impl Section {
             tables: Vec::new(),
             pictures: Vec::new(),
             checks: Vec::new(),
+            findings: Vec::new(),
         }
     }
 
@@ -55,11 +70,47 @@ impl Section {
         self
     }
 
-    /// Appends a statement with its verdict.
-    #[must_use]
-    pub fn check(mut self, check: Check) -> Self {
-        self.checks.push(check);
+    /// States what this program `found` for the statement `id`, the same in words, the evidence for
+    /// the verdict, and the command line that reproduces it.
+    pub(super) fn check(
+        mut self,
+        id: &'static str,
+        found: impl Into<Found>,
+        here: impl Into<String>,
+        evidence: impl Into<String>,
+        rerun: impl Into<String>,
+    ) -> Self {
+        self.findings.push(Finding {
+            id,
+            found: found.into(),
+            here: here.into(),
+            evidence: evidence.into(),
+            rerun: rerun.into(),
+        });
         self
+    }
+
+    /// The section with the verdicts on its statements, in their order.
+    ///
+    /// # Errors
+    /// If the computation gave nothing for one of them.
+    pub(super) fn with_checks(mut self, statements: &[Statement]) -> Result<Self, PaperError> {
+        for statement in statements {
+            let mut findings = self.findings.iter();
+            let finding = findings
+                .find(|finding| finding.id == statement.id)
+                .ok_or_else(|| PaperError::failed(statement.id)("the section has no result"))?;
+            self.checks.push(Check {
+                id: statement.id.to_owned(),
+                paper: statement.paper.to_owned(),
+                here: finding.here.clone(),
+                about: statement.about,
+                verdict: statement.expected.verdict(&finding.found),
+                evidence: finding.evidence.clone(),
+                rerun: finding.rerun.clone(),
+            });
+        }
+        Ok(self)
     }
 }
 

@@ -8,7 +8,8 @@ use nanotap_dynamics::{
 use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Points, Shape};
 
 use super::PaperError;
-use super::check::{Check, Verdict, digits};
+use super::check::digits;
+use super::expected::Found;
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
@@ -113,16 +114,16 @@ impl Slow {
         }
     }
 
-    /// The check of a number of motions of this period. A motion that is stable only at another
-    /// frequency that is printed alike leaves the statement open.
+    /// Checks a number of motions of this period. A motion that is stable only at another frequency
+    /// that is printed alike leaves the statement open.
     fn check(
         &self,
         runs: &Runs<'_>,
-        id: &str,
-        paper: &str,
+        section: Section,
+        id: &'static str,
         period: usize,
-        claimed: usize,
-    ) -> Result<Check, PaperError> {
+        further_evidence: &str,
+    ) -> Result<Section, PaperError> {
         let found = self.counted.stable(period).len();
         let mut here = format!(
             "{} is stable; {}",
@@ -138,17 +139,21 @@ impl Slow {
             );
         }
         let alike = printed_alike(&attracting);
-        let mut verdict = Verdict::of(found >= claimed);
-        if verdict == Verdict::Differs && claimed == 1 && !alike.is_empty() {
-            verdict = Verdict::Ambiguous;
+        let mut found_alike = found;
+        if found == 0 && !alike.is_empty() {
+            found_alike = 1;
             here = format!(
                 "{here}; within the rounding of 2.6 it is stable at Ω = {}",
                 in_words(&alike)
             );
         }
-        Ok(Check::new(id, paper, here, verdict)
-            .evidence(evidence)
-            .rerun(self.rerun_orbit(period)))
+        Ok(section.check(
+            id,
+            Found::readings(found as f64, found_alike as f64),
+            here,
+            evidence + further_evidence,
+            self.rerun_orbit(period),
+        ))
     }
 }
 
@@ -204,22 +209,14 @@ pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
             .with(loop_view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         words.push("(c, d) The only period-1 orbit that Newton found.");
     }
-    let check = slow.check(
-        runs,
-        "fig6",
-        "Fig. 6: two period-1 motions coexist at Ω = 2.6, α₁ = 0.1",
-        1,
-        2,
-    )?;
-    Ok(section
-        .picture(Picture::new(
-            "fig06",
-            "Motions at Ω = 2.6, α₁ = 0.1, in place of two coexisting period-1 motions (Fig. 6)",
-            format!("Eq. (26), N = 3. {} {KEY}", words.join(" ")),
-            figure,
-            128.0,
-        ))
-        .check(check))
+    let section = section.picture(Picture::new(
+        "fig06",
+        "Motions at Ω = 2.6, α₁ = 0.1, in place of two coexisting period-1 motions (Fig. 6)",
+        format!("Eq. (26), N = 3. {} {KEY}", words.join(" ")),
+        figure,
+        128.0,
+    ));
+    slow.check(runs, section, "fig6", 1, "")
 }
 
 /// Computes the section on Fig. 7: period 2 and period 3 at Ω = 2.6.
@@ -240,13 +237,13 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
             "{letters} The unstable period-{period} orbit, found by Newton."
         ));
     }
-    let mut no_three = String::new();
+    let mut about_three = String::new();
     if slow.of_period(3).is_empty()
         && let Some(chaos) = slow.counted.chaos().first()
     {
         let returns = Returns::of(model, chaos.state, runs.either(4000, 400))?;
         figure = figure.with(returns.panel()).with(returns.pieces(model));
-        no_three = returns.words();
+        about_three = format!("; {}", returns.words());
         captions.push(format!(
             "(c) The nearest return of the chaotic motion after n drive periods, observed over {} periods: \
              there are none after an odd number, because (d) the attractor has two pieces that the motion visits in turn. No \
@@ -255,33 +252,17 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         ));
     }
     captions.push(KEY.to_owned());
-    let two = slow.check(
-        runs,
-        "fig7-period-2",
-        "Fig. 7a, b: a period-2 motion exists at Ω = 2.6, α₁ = 0.1",
-        2,
-        1,
-    )?;
-    let mut three = slow.check(
-        runs,
-        "fig7-period-3",
-        "Fig. 7c, d: a period-3 motion exists at Ω = 2.6, α₁ = 0.1",
-        3,
-        1,
-    )?;
-    if !no_three.is_empty() {
-        three.evidence = format!("{}; {no_three}", three.evidence);
-    }
+    let section = slow.check(runs, section, "fig7-period-2", 2, "")?;
     let subject = Case::from(slow.counted.case.clone());
     if let Some((omega, orbit)) = period_three(&subject)? {
         let branch = slow.branch(runs, omega, &orbit)?;
         let (from, to) = branch.extent();
-        three.evidence = format!(
-            "{}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and is stable at {}",
-            three.evidence,
+        about_three = format!(
+            "{about_three}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and is stable at {}",
             in_words(&branch.attracting())
         );
     }
+    let section = slow.check(runs, section, "fig7-period-3", 3, &about_three)?;
     Ok(section
         .picture(Picture::new(
             "fig07",
@@ -297,9 +278,7 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         )
         .table(doubled_by_modes(runs)?)
         .table(pressed_at_rest(runs)?)
-        .table(slow_grids(runs)?)
-        .check(two)
-        .check(three))
+        .table(slow_grids(runs)?))
 }
 
 /// Intervals in which the period-2 orbit is stable, with one to five modes, compared with Ω = 2.6.

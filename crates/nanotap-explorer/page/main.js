@@ -264,8 +264,10 @@ function fresh(name) {
   takeOver();
 }
 
-async function openFile(file) {
+/** Opens a case file, with other files that it may name. */
+async function openFile(file, others) {
   try {
+    await link.keep(others);
     if (file) fresh(await link.open(file));
   } catch (error) { if (!superseded(error)) say(error); }
 }
@@ -325,7 +327,11 @@ async function begin() {
     list();
     $("open").click();
   });
-  $("open").addEventListener("change", () => openFile($("open").files[0]));
+  $("open").addEventListener("change", () => {
+    const list = [...$("open").files];
+    const file = list.find(({ name }) => name.toLowerCase().endsWith(".toml"));
+    openFile(file, list.filter((other) => other !== file));
+  });
   $("reset").addEventListener("click", () => fresh(basis()));
   $("undo").addEventListener("click", () => { steps -= 1; $("undo").disabled = steps <= 0; history.back(); });
   knobs.onChange((_, finished, note) => {

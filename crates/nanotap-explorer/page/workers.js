@@ -118,7 +118,7 @@ async function load() {
   const packed = inside(`${name}-module`);
   if (packed) {
     const bytes = Uint8Array.from(atob(packed.trim()), (letter) => letter.charCodeAt(0));
-    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
     return WebAssembly.compile(await new Response(plain).arrayBuffer()).catch(notCompiled);
   }
   const answer = await fetch(`./${name}.wasm`).catch(() => { throw new Error("no network: open the page again when there is one"); });

@@ -17,12 +17,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What the static page may load: only what lies beside it.
-const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; \
-    style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; manifest-src 'self'; \
-    base-uri 'none'; form-action 'none'";
-/// Where the policy is put: after the first element of the page's head.
-const HEAD: &str = "<meta charset=\"utf-8\">\n";
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use sha2::{Digest as _, Sha256};
+
+/// The version of the page in its service worker, until the page is written.
+const VERSION: &str = "\"development\"";
 
 /// Why the page was not written.
 #[derive(Debug, thiserror::Error)]
@@ -36,8 +36,8 @@ enum PageError {
     Module(#[from] exact::ModuleError),
     #[error(transparent)]
     Bundle(#[from] bundle::BundleError),
-    #[error("index.html has no `{0}`")]
-    Index(&'static str),
+    #[error("{0} has no `{1}`")]
+    Without(&'static str, String),
 }
 
 fn main() -> ExitCode {
@@ -66,12 +66,17 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
         let text = fs::read_to_string(&path).map_err(of(&path))?;
         texts.insert(name.into_owned(), text);
     }
-    let index = texts.get("index.html").map_or("", String::as_str);
     let whole = single::page(&texts, &fused, &exact)?;
-    let policy = format!("{HEAD}{}", policy(POLICY));
-    let static_index = replaced(index, HEAD, &policy)?;
+    // Another version of any file is another version of the page, which browsers then load anew.
+    let mut hash = Sha256::new();
+    for text in texts.values() {
+        hash.update(text);
+    }
+    hash.update(&fused);
+    let version = format!("\"{}\"", STANDARD.encode(hash.finalize()));
+    let worker = texts.entry("service-worker.js".into()).or_default();
+    *worker = replaced("service-worker.js", worker, VERSION, &version)?;
     fs::create_dir_all(folder).map_err(of(folder))?;
-    texts.insert("index.html".into(), static_index);
     let modules = [("nanotap.wasm", &fused), ("nanotap-exact.wasm", &exact)];
     let texts = texts
         .iter()
@@ -90,17 +95,12 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     Ok(())
 }
 
-/// The element that states a policy.
-fn policy(content: &str) -> String {
-    format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{content}\">\n")
-}
-
-/// A text with the one occurrence of a part replaced.
-fn replaced(text: &str, part: &'static str, by: &str) -> Result<String, PageError> {
+/// The text of a file with the first occurrence of a part replaced.
+fn replaced(name: &'static str, text: &str, part: &str, by: &str) -> Result<String, PageError> {
     if text.contains(part) {
         Ok(text.replacen(part, by, 1))
     } else {
-        Err(PageError::Index(part))
+        Err(PageError::Without(name, part.to_owned()))
     }
 }
 

@@ -7,14 +7,19 @@ use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec;
 use sha2::{Digest as _, Sha256};
 
-use crate::{HEAD, PageError, bundle, policy, replaced};
+use crate::{PageError, bundle, replaced};
 
+/// The page.
+const INDEX: &str = "index.html";
 /// Level of the compression of modules.
 const LEVEL: u8 = 10;
 /// What the page loads that is in the one file.
 const STYLE: &str = "<link rel=\"stylesheet\" href=\"./style.css\">\n";
 const SCRIPT: &str = "<script type=\"module\" src=\"./main.js\"></script>\n";
-const MANIFEST: &str = "<link rel=\"manifest\" href=\"./manifest.webmanifest\">\n";
+const ICON: &str = "href=\"./icon.svg\"";
+/// What begins and ends the page's policy.
+const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"";
+const CLOSED: &str = "\">";
 const END: &str = "</body>";
 
 /// The page, with both modules.
@@ -31,11 +36,21 @@ pub(crate) fn page(
         "default-src 'none'; script-src '{of_script}' 'wasm-unsafe-eval' blob:; worker-src blob:; \
          style-src '{of_style}'; img-src data: blob:; base-uri 'none'; form-action 'none'"
     );
-    let mut page = text("index.html").to_owned();
-    page = replaced(&page, HEAD, &format!("{HEAD}{}", policy(&content)))?;
-    page = replaced(&page, STYLE, &format!("<style>{style}</style>\n"))?;
-    page = replaced(&page, SCRIPT, "")?;
-    page = page.replace(MANIFEST, "");
+    let index = text("index.html");
+    let own = index
+        .split_once(POLICY)
+        .and_then(|(_, rest)| rest.split_once(CLOSED));
+    let (own, _) = own.ok_or_else(|| PageError::Without(INDEX, POLICY.to_owned()))?;
+    let icon = STANDARD.encode(text("icon.svg"));
+    let mut page = index.to_owned();
+    for (part, by) in [
+        (own, content.as_str()),
+        (STYLE, &format!("<style>{style}</style>\n")),
+        (SCRIPT, ""),
+        (ICON, &format!("href=\"data:image/svg+xml;base64,{icon}\"")),
+    ] {
+        page = replaced(INDEX, &page, part, by)?;
+    }
     let part = |id: &str, kind: &str, text: &str| {
         format!("<script type=\"{kind}\" id=\"{id}\">{text}</script>\n")
     };
@@ -50,7 +65,7 @@ pub(crate) fn page(
         format!("<script>{script}</script>\n"),
         END.to_owned(),
     ];
-    replaced(&page, END, &parts.concat())
+    replaced(INDEX, &page, END, &parts.concat())
 }
 
 /// A script that may stand in a page.

@@ -11,6 +11,7 @@
 
 mod benches;
 mod book;
+mod constants;
 mod dist;
 mod figures;
 mod package;

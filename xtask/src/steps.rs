@@ -5,7 +5,7 @@ use std::process::Command;
 use crate::process::{check, must, tests};
 use crate::tally::Tally;
 use crate::tools::{PYTHON, Workspace};
-use crate::{benches, book, dist, figures, package, page, peers, wheel};
+use crate::{benches, book, constants, dist, figures, package, page, peers, wheel};
 
 /// A task of `cargo xtask`.
 pub(crate) struct Step {
@@ -120,6 +120,12 @@ pub(crate) static OTHER_TASKS: &[Step] = &[
         about: "run every bench and write docs/benches.md",
         takes_options: false,
         run: |workspace, _| benches::run(workspace),
+    },
+    Step {
+        name: "constants",
+        about: "write docs/constants.md (--try CRATE [NAME...]: double and halve constants, record the tests that fail)",
+        takes_options: true,
+        run: constants::run,
     },
     Step {
         name: "build-times",

@@ -719,6 +719,7 @@ impl Case {
 
     /// A value of a key with ten digits; for a physical case in SI with a prefix.
     pub fn shown(&self, key: Key, value: f64) -> String {
+        /// Significant digits of a value in a message or a table.
         const DIGITS: usize = 10;
         self.parameter_unit(key).map_or_else(
             || {

@@ -211,6 +211,7 @@ impl WrittenState {
 
 /// The beginning of a text, for messages.
 fn shortened(text: &str) -> String {
+    /// Most characters of a text that a message repeats.
     const LONGEST: usize = 60;
     if text.chars().count() <= LONGEST {
         return text.to_owned();

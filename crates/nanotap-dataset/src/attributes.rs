@@ -77,6 +77,7 @@ fn opened(value: &Value) -> Value {
 }
 
 fn short(value: &Value) -> String {
+    /// Most characters of a value that a message repeats.
     const LONGEST: usize = 60;
     if value.is_null() {
         return "nothing".into();

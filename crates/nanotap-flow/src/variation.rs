@@ -368,9 +368,10 @@ impl Variation<'_> {
     }
 }
 
-/// Number of nodes of a panel, and angle in radians through which its fastest exponential turns
-/// over it: the quadrature's relative error, (θ/2)³² 16!⁴/(33 · 32!³) at θ = 12, is below 1e-17.
+/// Number of nodes of a panel: the quadrature's relative error, (θ/2)³² 16!⁴/(33 · 32!³) at the
+/// angle θ = 12 of [`PANEL`], is below 1e-17.
 const NODES: usize = 16;
+/// Angle in radians through which the fastest exponential turns over a panel.
 const PANEL: f64 = 12.0;
 
 /// Places in (0, 1) and weights of Gauss–Legendre quadrature.

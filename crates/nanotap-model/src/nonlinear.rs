@@ -32,8 +32,9 @@ use crate::sample_law::SampleLaw;
 use crate::{Model, ModelError, MotionError};
 
 /// Length, in drive periods, of the transient with which motions over a relaxing surface are
-/// guessed; and the largest relaxation time of the surface during it, in drive periods.
+/// guessed.
 const SETTLING_PERIODS: usize = 400;
+/// Largest relaxation time of the surface during this transient, in drive periods.
 const SLOWEST_PERIODS: f64 = 15.0;
 /// Relaxation time, in drive periods, beyond which a surface counts as slow.
 const SLOW_PERIODS: f64 = 1000.0;

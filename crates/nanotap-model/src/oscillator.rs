@@ -68,8 +68,11 @@ pub struct OscillatorError {
 
 /// Largest magnitude of a parameter; beyond it products of parameters lose all digits.
 const LARGEST: f64 = 1e12;
+/// Range of a positive parameter.
 const POSITIVE: (f64, f64) = (f64::MIN_POSITIVE, LARGEST);
+/// Range of a parameter that may be zero.
 const NOT_NEGATIVE: (f64, f64) = (0.0, LARGEST);
+/// Range of a parameter of either sign.
 const FINITE: (f64, f64) = (-LARGEST, LARGEST);
 
 /// The table of parameters: name in case files and range.

@@ -208,6 +208,7 @@ const fn number(name: &'static str, symbol: &'static str, meaning: &'static str)
     ParameterEntry::new(name, symbol, meaning)
 }
 
+/// Range of a parameter of either sign.
 const SIGNED: (f64, f64) = (-LARGEST_ALPHA, LARGEST_ALPHA);
 
 /// Declares a measured number of a mode; 0 stands for none.

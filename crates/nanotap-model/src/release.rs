@@ -23,8 +23,9 @@ use crate::oscillator::{Oscillator, Stop};
 
 /// Number of drive periods for which the motion is followed at most.
 pub const MAX_PERIODS: usize = 512;
-/// Largest number of steps and of impacts of the search.
+/// Largest number of steps of the search.
 const MAX_STEPS: usize = 1_000_000;
+/// Largest number of impacts of the search.
 const MAX_IMPACTS: usize = 20_000;
 /// Largest standard error of the state, as a part of its size, at which it counts as known.
 const KNOWN: f64 = 1e-3;
@@ -39,6 +40,7 @@ const SHORTEST_STEP: f64 = 1e-13;
 const CHATTER_CHANGE: f64 = 1e-8;
 /// Smallest velocity ξ′ of an impact whose instant is determined.
 const SLOWEST_IMPACT: f64 = 1e-15;
+/// Largest number of Newton steps to an impact.
 const MAX_NEWTON_STEPS: usize = 60;
 /// Largest order of a Taylor series.
 const MAX_ORDER: u32 = 200;

@@ -35,10 +35,11 @@ pub const INSTANTS: usize = 48;
 pub const SIZE_RATIO: f64 = 1.03;
 /// Successive sizes that are scanned together.
 const SIZES_TOGETHER: usize = 12;
-/// Changes of the tip's speed over its amplitude in the orbit: the first that is tried, the least,
-/// which is still far above rounding, and the largest.
+/// First change of the tip's speed that is tried, over its amplitude in the orbit.
 const FIRST_SIZE: f64 = 1.0 / 1024.0;
+/// Least such change, still far above rounding.
 const LEAST_SIZE: f64 = 1e-9;
+/// Largest such change.
 const LARGEST_SIZE: f64 = 4.0;
 /// The scan begins at this part of the largest size that upsets at no instant.
 const FIRST_SCANNED: f64 = 0.25;
@@ -58,9 +59,9 @@ const ROUNDS: usize = 40;
 /// Largest number of knocks of a round from which a smaller one is looked for, where the exact flow
 /// confirms none.
 const MAX_TRIED: usize = 8;
-/// First and last step in which the exact flow looks for the end of a basin, as a part of a size, and
-/// the largest number of steps.
+/// First and last step in which the exact flow looks for the end of a basin, as a part of a size.
 const EXACT_STEP: [f64; 2] = [1e-3, 1e-4];
+/// Largest number of these steps.
 const EXACT_STEPS: usize = 12;
 /// Parts that fill an interval evenly, however many are drawn, alone and in pairs: 1/g and 1/p, 1/p²
 /// of the golden and the plastic ratio (Roberts 2018).

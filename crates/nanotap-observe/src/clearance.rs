@@ -596,6 +596,7 @@ fn shares(modes: &Modes) -> Arc<Vec<f64>> {
     /// Number of positions per mode: between them a share changes by less than (π/32)²/4 of the
     /// largest deflection, 2.
     const PLACES: usize = 32;
+    /// Bound of this change of a share.
     const BETWEEN: f64 = 0.005;
     let count = modes.count();
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);

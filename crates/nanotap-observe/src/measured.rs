@@ -233,6 +233,7 @@ impl<'a, D: Number> Measured<'a, D> {
     /// Minimum force of the sample on the tip: negative if it pulls, as the paper's damper does on
     /// a receding tip. A force that vanishes at the end of contact counts as 0.
     pub(super) fn least_force(&mut self) -> D {
+        /// Largest force, as a part of the peak force, that is the rounding of zero.
         const ROUNDING: f64 = 1e-12;
         let (least, peak) = (self.least(Signal::Force), self.peak_force());
         if least.value().abs() <= ROUNDING * peak.value() {

@@ -125,6 +125,7 @@ impl<D: Number> Phasor<D> {
 /// `value`, or 0 if it is only the rounding of a sum of terms of the given size; its derivative
 /// stays.
 pub(super) fn above_rounding<D: Number>(value: D, size: f64) -> D {
+    /// Largest value, as a part of the size of the terms, that is the rounding of zero.
     const ROUNDING: f64 = 1e-12;
     if value.value().abs() <= ROUNDING * size {
         value - D::from(value.value())

@@ -150,6 +150,7 @@ fn enclosed_pair(
     value: Complex<f64>,
     vector: &DVector<Complex<f64>>,
 ) -> Option<(Rectangle, Vec<Rectangle>)> {
+    /// Largest number of enclosures that are tried, each wider than the one before.
     const MAX_ROUNDS: usize = 12;
     let n = matrix.rows();
     let fixed = (0..n).max_by(|&a, &b| vector[a].norm_sqr().total_cmp(&vector[b].norm_sqr()))?;

@@ -288,6 +288,7 @@ fn sin_cos_of(x: f64) -> (Interval, Interval) {
 
 /// The exponential function of one number: x = k ln 2 + r, and the Taylor series of eʳ.
 fn exp_of(x: f64) -> Interval {
+    /// Largest argument whose exponential is computed; beyond it only bounds are given.
     const MAX_ARGUMENT: f64 = 700.0;
     if x == 0.0 {
         return Interval::ONE;

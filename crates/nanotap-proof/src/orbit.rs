@@ -131,9 +131,11 @@ const MIN_CHANGE_WEIGHT: f64 = 0.1;
 const MIN_WEIGHT: f64 = 1e-9;
 /// Newton steps in floating-point numbers before the test.
 const NEWTON_STEPS: usize = 4;
-/// Relative size of the first box. Each following box is larger by the factor [`BOX_GROWTH`].
+/// Relative size of the first box.
 const FIRST_BOX: f64 = 1e-14;
+/// Factor by which each following box is larger.
 const BOX_GROWTH: f64 = 10.0;
+/// Relative size beyond which no larger box is tried.
 const MAX_BOX: f64 = 0.1;
 /// Number of further applications of the operator to the enclosure.
 const REFINEMENTS: usize = 3;

@@ -3,10 +3,12 @@
 use super::units::{Scale, find_unit, nearest_units};
 use super::{Kind, Quantity, QuantityError, offer};
 
-/// Units that a product may be written of are few and powers small: bounds keep hostile text
-/// from overflowing an exponent or the stack.
+/// Largest power of a unit. With the next two limits it keeps hostile text from overflowing an exponent
+/// or the stack.
 const MAX_POWER: i32 = 9;
+/// Largest depth of parentheses.
 const MAX_DEPTH: usize = 4;
+/// Largest number of factors of a unit, parentheses included.
 const MAX_FACTORS: usize = 16;
 
 pub(super) fn read(text: &str, expected: Option<Kind>) -> Result<Quantity, QuantityError> {

@@ -42,15 +42,17 @@ use nanotap_study::limits::{MAX_PERIOD, MAX_PERIODS};
 use nanotap_study::request::options;
 use nanotap_study::start_box::before_wall;
 
-/// Most points along an axis, and of a slice.
+/// Most points along an axis.
 const MOST: usize = 1_000_000;
+/// Most points of a slice.
 const MAX_POINTS: usize = 4_000_000_000;
-/// Points that a chunk should not exceed, and chunks that a large slice is cut into.
+/// Points that a chunk should not exceed.
 const CHUNK_POINTS: usize = 1 << 20;
+/// Chunks that a large slice is cut into.
 const CHUNKS: usize = 64;
-/// Points along each axis of the grid on which motions that the census missed are looked
-/// for, and how many of its points are classified at a time.
+/// Points along each axis of the grid on which motions that the census missed are looked for.
 const COARSE: usize = 64;
+/// Unsettled points of this grid that are classified at a time.
 const STRANGERS: usize = 64;
 /// ModelMap points by which an attractor is shown.
 const SHOWN: usize = 512;

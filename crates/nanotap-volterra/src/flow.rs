@@ -14,8 +14,9 @@ use std::sync::Arc;
 /// Number of switches at one instant above which an endless sequence of switches is reported.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
 /// Number of evaluations of the force in closed form that cost as much as a step of the approximate
-/// flow; below it, the cost of a factorisation in such steps.
+/// flow.
 const STEP_EVALUATIONS: u64 = 2;
+/// Cost of a factorisation in such steps.
 const FACTORISATION_COST: u64 = 8;
 /// Number of modal coordinates whose linear part of an evaluation costs as much as a force in closed
 /// form.

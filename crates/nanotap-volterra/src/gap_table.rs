@@ -8,8 +8,9 @@ use crate::system::System;
 const INTERVALS: usize = 2048;
 /// Largest number of branches of a law that is tabulated.
 const MAX_BRANCHES: usize = 64;
-/// Number of gaps at which a table is compared with the law, and largest relative difference.
+/// Number of gaps at which a table is compared with the law.
 const CHECKS: usize = 64;
+/// Largest relative difference of a table from the law.
 const ACCURACY: f64 = 1e-6;
 /// Length of a table, as a multiple of the size of gaps and amplitudes.
 const REACH: f64 = 2.0;

@@ -40,7 +40,7 @@ pub(super) fn page(constants: &[Constant], trials: &Trials) -> String {
                 .split_once("/src/")
                 .map_or("", |(_, file)| file);
             let name = constant.name.split('#').next().unwrap_or_default();
-            let value = in_cell(&constant.value);
+            let value = constant.value.replace('|', "\\|");
             let meaning = in_cell(&constant.meaning);
             let _ = write!(text, "| `{file}` | `{name}` | `{value}` | {meaning} |");
             if is_tried {
@@ -96,11 +96,11 @@ const HEAD: &str = "\
 <!-- Written by `cargo xtask constants`. -->
 
 The named numbers in the sources that steer a computation: tolerances, limits, counts of steps, and the
-thresholds of verdicts. Each stands in the code where it is used; a comment there says what it means, and
-this page repeats it. `cargo xtask constants --try CRATE` doubles and halves each constant of a crate in
-a copy of the sources and runs the tests of this crate; the last two columns name the first test that
-fails. Both elements of a range are scaled together. Where they say \"no test\", the tests of the crate
-accept either value; tests of crates that use it may not. Empty cells were not tried.
+thresholds of verdicts. Each stands in the code where it is used; the comment there says what it means,
+and its range of validity where that is known. `cargo xtask constants --try CRATE` doubles and halves
+each constant of a crate in a copy of the sources and runs the tests of this crate; the last two columns
+name the first test that fails. Both elements of a range are scaled together. Where they say \"no test\",
+the tests of the crate accept the value; those of crates that use it may not. Empty cells were not tried.
 ";
 
 #[cfg(test)]

@@ -246,6 +246,7 @@ fn judge(value: &DeValue<'_>) -> Value {
 
 /// A value shortened for use in a sentence.
 fn shortened(written: &str) -> String {
+    /// Most characters of a value that a message repeats.
     const LONGEST: usize = 40;
     let line = written.lines().next().unwrap_or_default();
     if line.len() == written.len() && line.chars().count() <= LONGEST {

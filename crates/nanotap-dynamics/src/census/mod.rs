@@ -79,9 +79,9 @@ const MIN_WAIT_PERIODS: usize = 64;
 const COARSE_WAIT_FACTOR: f64 = 1.3;
 /// Longest such wait on a coarse map, in periods.
 const MAX_COARSE_WAIT_PERIODS: usize = 2048;
-/// Largest number of periods for which all chaotic starts together are watched on a coarse map, and
-/// the number of rounds: each takes as long as all before it.
+/// Largest number of periods for which all chaotic starts together are watched on a coarse map.
 const WATCHED_TOGETHER: usize = 400_000;
+/// Largest number of rounds in which they are watched: each takes as long as all before it.
 const WATCH_ROUNDS: u32 = 4;
 /// On a coarse map chaos is watched until the whole census has taken this multiple of
 /// [`CensusOptions::max_steps`].

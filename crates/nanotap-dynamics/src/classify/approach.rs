@@ -19,9 +19,9 @@ const NEARBY: f64 = 0.1;
 /// Largest ratio of a decay time to four such stretches for which the run is watched for the whole
 /// time.
 const SLOWEST: f64 = 10.0;
-/// Number of decay times for which the run is watched, and the largest initial distance, in sizes
-/// of the orbit, that prolongs it.
+/// Number of decay times for which the run is watched.
 const LONGEST_WATCH: f64 = 5.0;
+/// Largest initial distance, in sizes of the orbit, that prolongs this time.
 const FARTHEST: f64 = 1e9;
 /// Number of points of the remaining way at which the map is tried.
 const PLACES: usize = 16;

@@ -14,8 +14,9 @@ use crate::vector::{distance, norm};
 /// Largest orbit without a size, as a fraction of the state scale of its branch.
 const MIN_ORBIT_SIZE: f64 = 1e-6;
 
-/// Steps of the central differences, as fractions of the scales.
+/// Largest step of the central differences, as a fraction of the scales.
 const MAX_DIFFERENCE_STEP: f64 = 1e-6;
+/// Smallest step of the central differences, as a fraction of the scales.
 const MIN_DIFFERENCE_STEP: f64 = 1e-8;
 
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.

@@ -41,8 +41,9 @@ impl Criticality {
     }
 }
 
-/// Steps of the differences, in units of the orbit's size, each a quarter of the one before.
+/// First step of the differences, in units of the orbit's size.
 const FIRST_STEP: f64 = 4e-3;
+/// Number of steps of the differences, each a quarter of the one before.
 const STEPS: usize = 6;
 /// Relative difference of the coefficients of two steps that agree.
 const AGREEMENT: f64 = 0.1;

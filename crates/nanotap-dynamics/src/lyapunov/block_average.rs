@@ -7,6 +7,7 @@
 //! is too small while the correlation time is longer than a block, which is why there are never
 //! more than 64 blocks.
 
+/// Largest number of blocks.
 const BLOCKS: usize = 64;
 
 /// Running block averages of a fixed number of quantities.

@@ -28,6 +28,7 @@ const ENTRY_ERROR: f64 = 1e-12;
 const PLAIN_SPAN: f64 = 11.5;
 /// Coupling below which two blocks count as separated.
 const SEPARATED: f64 = 1e-13;
+/// Largest number of sweeps of QR factorisations through the factors.
 const MAX_SWEEPS: usize = 80;
 
 /// Stability of an orbit according to its multipliers.

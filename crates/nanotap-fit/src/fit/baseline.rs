@@ -30,10 +30,12 @@ const OFF: f64 = 4.0;
 const DECADES: (i32, f64) = (5, 0.25);
 /// A scan counts if it lowers the cost by this factor: of many rows few may be in contact.
 const BETTER: f64 = 0.999;
-/// Rounds in which the pull-off force and its parameter meet, to a part of it; least power with which
-/// one changes with the other, and the inverse of the largest.
+/// Rounds in which the pull-off force and its parameter meet.
 const ROUNDS: usize = 12;
+/// Relative change of the parameter in a round up to which they have met.
 const CLOSE: f64 = 1e-3;
+/// Least power with which the pull-off force changes with its parameter, and the inverse of the
+/// largest.
 const MIN_POWER: f64 = 0.2;
 /// Rounds in which the offset and the adhesion meet.
 const MEETINGS: usize = 2;

@@ -26,9 +26,10 @@ use super::statistics::{self, Information, Sequences, information, student};
 const MIN_REDUCTION: f64 = 0.1;
 /// Largest number of times that a fit continues from a lower chi2 of its profile.
 const MAX_CONTINUATIONS: usize = 4;
-/// Level of the tests whether the residuals are noise: of their size, which is the only one that
-/// sees much in few rows, and of their signs.
+/// Level of the test whether the size of the residuals is that of noise, the only test that sees
+/// much in few rows.
 const LEVEL: f64 = 0.01;
+/// Level of the test whether the signs of the residuals are those of noise.
 const LEVEL_OF_SIGNS: f64 = 0.005;
 /// Chance up to which the size of a column's residuals is named.
 const LARGER: f64 = 0.05;

@@ -30,8 +30,9 @@ const FACTOR: f64 = 8.0;
 /// Mean rough cost of a value, relative to that of the best fit and beyond it, up to which a start
 /// is followed to its minimum.
 const ROUGH_REACH: (f64, f64) = (1.5, 0.01);
-/// Largest number of rows of a curve in the rough fits, and rounds of these.
+/// Largest number of rows of a curve in the rough fits.
 const ROUGH_ROWS: usize = 20;
+/// Number of rounds of the rough fits.
 const ROUNDS: usize = 3;
 /// Two minima are the same if the residuals change by less than this between them, to first order,
 /// in standard errors.

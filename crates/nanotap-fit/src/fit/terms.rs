@@ -69,9 +69,9 @@ const SHORT: [(&str, &str); 7] = [
 
 /// Periods of interference, m: half the wavelengths of lasers and diodes, from 500 to 1100 nm.
 pub(super) const PERIODS: [f64; 2] = [250e-9, 550e-9];
-/// First value of the period and standard deviation of its prior, m: most instruments have light of
-/// 635 to 860 nm.
+/// First value of the period, m: most instruments have light of 635 to 860 nm.
 const PERIOD: f64 = 375e-9;
+/// Standard deviation of the prior of the period, m.
 const PERIOD_PRIOR: f64 = 75e-9;
 /// Standard deviation of the prior of drift and backlash, as a part of the range of distances.
 const DISTANCE_PRIOR: f64 = 0.2;

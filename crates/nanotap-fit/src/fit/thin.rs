@@ -34,9 +34,9 @@ const MIN_PARABOLA: usize = 8;
 /// A parabola through the bin alone is used where the bend is more than this many standard errors of
 /// the mean.
 const BENT: f64 = 1.0;
-/// A bin with a bend of more than this many standard errors of its mean is halved, as long as its
-/// halves have so many rows.
+/// A bin with a bend of more than this many standard errors of its mean is halved.
 const SPLIT: f64 = 0.5;
+/// Fewest rows of each half of a bin.
 const MIN_SPLIT: usize = 5;
 /// Share of the noise in the path.
 const NOISE_OF_PATH: f64 = 0.35;

@@ -58,12 +58,13 @@ const MIN_GRID_STEP: f64 = 1e-3;
 const MAX_PIECES: usize = 400;
 /// Points after which a branch is not followed further.
 const MAX_POINTS: usize = 2000;
-/// Periods in which a motion that is followed on the grid may close at each of its distances, and
-/// after which one is measured that starts on the motion of the grid's distance before.
+/// Periods in which a motion that is followed on the grid may close at each of its distances.
 const GRID_TRANSIENT: usize = 512;
+/// Periods after which a motion is measured that starts on the motion of the grid's distance before.
 const ROW_TRANSIENT: usize = 128;
-/// Decay times that a jump is given to settle, and periods at most.
+/// Decay times that a jump is given to settle.
 const DECAY_TIMES: f64 = 30.0;
+/// Most drive periods that a jump is given to settle.
 const MAX_TRANSIENT: usize = 1 << 15;
 
 /// Steps after which a motion is not followed further along the distance.

@@ -228,9 +228,10 @@ struct Written<'a> {
     not_followed: &'a str,
 }
 
-/// Distances of an interval at which the two ways are compared, its ends included. Where a motion has
-/// no branch there are fewer, since it takes longer, and none at the ends, where another motion begins.
+/// Distances of an interval at which the two ways are compared, its ends included.
 const COMPARED: usize = 9;
+/// The same number where a motion has no branch: fewer, since it takes longer, and none at the ends,
+/// where another motion begins.
 const COMPARED_ON_GRID: usize = 3;
 
 impl Written<'_> {

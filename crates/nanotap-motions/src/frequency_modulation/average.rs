@@ -151,8 +151,9 @@ impl<'a> Averages<'a> {
 /// Distance at which the integral outwards begins, in amplitudes: its first piece goes on to
 /// infinity.
 const FAR: f64 = 1e6;
-/// Halvings of the step of the quadrature, and its relative error at which they end.
+/// Largest number of halvings of the step of the quadrature.
 const HALVINGS: u32 = 9;
+/// Relative change by a halving at which the quadrature ends.
 const INTEGRATED: f64 = 1e-13;
 /// Largest variable of the quadrature: beyond it the weights are below rounding.
 const WIDEST: f64 = 3.2;

@@ -123,8 +123,9 @@ pub struct ExactVerdict {
 pub const APPARENT_CLOSURE: f64 = 1e-6;
 /// Longest apparent period looked for.
 const LONGEST_APPARENT: usize = 64;
-/// Drive periods, and steps of them, kept for figures.
+/// Largest number of drive periods kept for figures.
 const CURVE_PERIODS: usize = 64;
+/// Largest number of steps kept for figures.
 const CURVE_POINTS: usize = 2_000_000;
 
 /// Runs `model` with fixed steps.

@@ -30,18 +30,19 @@ use nanotap_fit::fit::instrument::median;
 
 /// Number of passes; the first one takes the motion as sinusoidal.
 pub(super) const PASSES: usize = 12;
-/// Passes from which on the nodes stay and the penalty is adapted, and motions are averaged with
-/// those before.
+/// Pass from which on the nodes stay and the penalty is adapted.
 const ADAPTED: usize = 2;
+/// Pass from which on motions are averaged with those before.
 const AVERAGED: usize = 3;
 /// Nodes on either side over which the squared curvature is averaged.
 const WINDOW: usize = 6;
 /// Part of the mean squared curvature that is added to the local one.
 const BACKGROUND: f64 = 0.1;
-/// Fraction of its change by which a row's values move in a pass, from the pass on in which the force
-/// is stable, and the largest residual that counts, in standard errors.
+/// Fraction of its change by which a row's values move in a pass.
 const MOVE: f64 = 0.3;
+/// Pass from which on they move, in which the force is stable.
 const MOVED: usize = 4;
+/// Largest residual that counts for this, in standard errors.
 const MAX_MOVED_RESIDUAL: f64 = 3.0;
 /// Distance over which slopes are averaged for the errors: in spacings of the nodes plus in standard
 /// errors of the amplitude.

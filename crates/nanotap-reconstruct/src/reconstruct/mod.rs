@@ -47,8 +47,9 @@ use lever::{Lever, Method};
 use nodes::Kernel;
 use rows::{Excitation, Kind, Readings, floors};
 
-/// Fewest rows that feel the sample; below [`FEW_ROWS`] a warning is given.
+/// Fewest rows that feel the sample.
 const MIN_ROWS: usize = 8;
+/// Number of such rows below which a warning is given.
 const FEW_ROWS: usize = 25;
 /// Greatest spacing of the nodes: in m, or for a dimensionless case as a fraction of the free
 /// amplitude.

@@ -11,8 +11,9 @@ use super::nodes::Nodes;
 const PHASES: usize = 900;
 /// Highest harmonic of the motion.
 pub(super) const HARMONICS: usize = 24;
-/// Bounds of the relaxation of the fixed-point iteration, and of its number of steps.
+/// Bounds of the relaxation of the fixed-point iteration.
 const RELAXATION: [f64; 2] = [0.08, 1.0];
+/// Bounds of the number of steps of the fixed-point iteration.
 const STEPS: [f64; 2] = [4.0, 24.0];
 
 /// The harmonics at all phases.

@@ -6,9 +6,10 @@ use std::f64::consts::PI;
 
 /// Growth of the spacing beyond the finely resolved range.
 const GROWTH: f64 = 1.08;
-/// Limits of the number of evenly spaced nodes. With fewer, the penalty on the roughness would hold
-/// for less than the range over which a force changes.
+/// Least number of evenly spaced nodes. With fewer, the penalty on the roughness would hold for less
+/// than the range over which a force changes.
 const MIN_EVEN_NODES: f64 = 60.0;
+/// Largest number of evenly spaced nodes.
 const MAX_EVEN_NODES: f64 = 200.0;
 /// Upper limit of the number of nodes beyond them.
 const MAX_OUTER_NODES: usize = 200;

@@ -18,8 +18,9 @@ use super::report::{BranchChange, Direction};
 /// Fraction of the error beyond which the amplitude is off the setpoint, up to which the amplitude
 /// has returned to it.
 const AT_SETPOINT: f64 = 0.2;
-/// Fewest and most periods for which the lever stays at the setpoint until its state counts.
+/// Fewest periods for which the lever stays at the setpoint until its state counts.
 const SHORTEST_STAY: f64 = 10.0;
+/// Most periods of this stay.
 const LONGEST_STAY: f64 = 1e5;
 /// Largest number of changes that are recorded.
 const MAX_CHANGES: usize = 10_000;

@@ -23,8 +23,9 @@ use nanotap_motions::frequency_modulation::{FreeOscillation, Held as Condition};
 use nanotap_study::FreeMotion;
 use nanotap_study::value::implied;
 
-/// First and shortest step of the distance, relative to the size of the motion.
+/// First step of the distance, relative to the size of the motion.
 const FIRST: f64 = 0.02;
+/// Shortest step of the distance, relative to the size of the motion.
 const SHORTEST: f64 = 5e-4;
 /// Largest changes in a step up to which two motions are taken for the same: amplitude over that of
 /// the free lever, phase in degrees, strength over that of the free lever.
@@ -33,9 +34,9 @@ const FARTHEST: [f64; 3] = [0.1, 15.0, 0.3];
 const AT_RESONANCE: f64 = 2.0;
 /// Logarithm of a tone's frequency over the resonance nearest to it, up to which its loop finds it.
 const FARTHEST_RESONANCE: f64 = 0.2;
-/// Most secant steps towards the distance of the setpoint, and the relative error of the amplitude
-/// at which they stop.
+/// Most secant steps towards the distance of the setpoint.
 const SECANTS: usize = 40;
+/// Relative error of the amplitude at which they stop.
 const REACHED: f64 = 1e-10;
 /// Time in which a motion settles, over the time in which a disturbance falls to 1/e.
 const FORGOTTEN: f64 = 20.0;

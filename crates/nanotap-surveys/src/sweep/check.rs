@@ -15,8 +15,9 @@ use nanotap_study::target::Target;
 
 /// Most bytes that one chunk may take in memory.
 pub(super) const LARGEST_CHUNK: usize = MAX_CHUNK_BYTES;
-/// Most runs of a sweep, and most periods of a run.
+/// Most runs of a sweep.
 const MAX_RUNS: usize = 1_000_000_000;
+/// Most periods of a run.
 const MAX_PERIODS: usize = 100_000_000;
 
 /// Checks options against the case.

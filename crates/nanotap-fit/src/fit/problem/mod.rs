@@ -639,6 +639,7 @@ impl Problem<'_> {
         branches: &[Vec<usize>],
         seen: &[Vec<Option<RowPoint>>],
     ) -> Point {
+        /// Cost of a change of branch from one row to the next, as a sum of squared residuals.
         const BRANCH_CHANGE_COST: f64 = 20.0;
         // One residual of eight standard errors.
         const MAX_NOISE_COST: f64 = 18.0;

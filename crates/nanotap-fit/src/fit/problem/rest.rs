@@ -21,15 +21,17 @@ use nanotap_scan::force_curve::{Chain, RestLever, StableRest};
 
 /// Margin of the range of distances, as a part of it.
 const MARGIN: f64 = 0.05;
-/// How far beyond the rows a rest is searched for first, in m, and how often four times as far.
+/// How far beyond the rows a rest is searched for first, m.
 const REACH: f64 = 1e-9;
+/// Number of these searches, each four times as far as the one before.
 const TRIES: i32 = 8;
-/// Rows after a jump that are this many standard deviations off their branch do not count, up to so
-/// many.
+/// Rows after a jump that are this many standard deviations off their branch do not count.
 const RINGING: f64 = 3.0;
+/// Largest number of rows after a jump that do not count.
 pub(in crate::fit) const MAX_RINGING: usize = 6;
-/// Highest overshoot, in heights of the jump, and how the ringing decays from row to row.
+/// Highest overshoot, in heights of the jump.
 const HIGHEST: f64 = 1.2;
+/// Factor by which the ringing decays from row to row.
 const DECAY: f64 = 0.6;
 /// Step of a distance for the slope of a deflection, m.
 const SLOPE_STEP: f64 = 1e-10;

@@ -15,7 +15,10 @@ const TABLE: &str = "xtask/constants.toml";
 /// The result of a trial whose value the compiler refuses.
 pub(super) const NOT_COMPILED: &str = "does not compile";
 
-/// A test that takes longer than this, in s, fails: another value may cause an endless search.
+/// Begins the result of a trial in which only a test that took too long failed.
+const STOPPED: &str = "stopped: ";
+
+/// A test that takes longer than this, in s, is stopped: another value may cause an endless search.
 const LONGEST_TEST: u32 = 300;
 
 /// The first test that fails with each value: empty if none does.
@@ -28,9 +31,10 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    /// Whether neither value passes.
+    /// Whether a test fails with either value.
     pub(super) fn is_noticed(&self) -> bool {
-        !self.doubled.is_empty() && !self.halved.is_empty()
+        let fails = |result: &String| !result.is_empty() && !result.starts_with(STOPPED);
+        fails(&self.doubled) && fails(&self.halved)
     }
 }
 
@@ -243,19 +247,19 @@ impl Copy {
         if succeeded {
             return Ok(String::new());
         }
-        Ok(failed_test(&lines).map_or_else(|| NOT_COMPILED.to_owned(), str::to_owned))
+        Ok(failed_test(&lines).unwrap_or_else(|| NOT_COMPILED.to_owned()))
     }
 }
 
-/// The name of the first test that nextest reports as failed or stopped.
-fn failed_test(lines: &[String]) -> Option<&str> {
-    let failed = ["FAIL [", "TIMEOUT [", "SIGABRT [", "SIGSEGV [", "SIGKILL ["];
-    let is_failed = |line: &&String| {
-        failed
-            .iter()
-            .any(|word| line.trim_start().starts_with(word))
+/// The first test that nextest reports as failed. One that was stopped is named as such: the value
+/// may cause an endless search, or the machine may be busy.
+fn failed_test(lines: &[String]) -> Option<String> {
+    let name = |words: &[&str]| {
+        let is_one = |line: &&String| words.iter().any(|word| line.trim_start().starts_with(word));
+        lines.iter().find(is_one)?.split_whitespace().last()
     };
-    lines.iter().find(is_failed)?.split_whitespace().last()
+    let failed = name(&["FAIL [", "SIGABRT [", "SIGSEGV [", "SIGKILL ["]).map(str::to_owned);
+    failed.or_else(|| Some(format!("{STOPPED}{}", name(&["TIMEOUT ["])?)))
 }
 
 #[cfg(test)]
@@ -291,7 +295,8 @@ mod tests {
             "     TIMEOUT [ 300.0s] (3/3) a::b d",
         ];
         let lines = lines.map(str::to_owned);
-        assert_eq!(failed_test(&lines), Some("range::is_wide"));
+        assert_eq!(failed_test(&lines).as_deref(), Some("range::is_wide"));
+        assert_eq!(failed_test(&lines[2..]).as_deref(), Some("stopped: d"));
         assert_eq!(failed_test(&lines[..1]), None);
     }
 }

@@ -88,15 +88,20 @@ def site(folder: Path) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine: Debian's package is called chromium")
+def playwright() -> Iterator[Any]:
     sync_api = pytest.importorskip("playwright.sync_api")
     with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        with limited(20):
-            browser.close()
+        yield playwright
+
+
+@pytest.fixture(scope="module")
+def browser(playwright: Any) -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine: Debian's package is called chromium")
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    yield browser
+    with limited(20):
+        browser.close()
 
 
 @pytest.fixture(autouse=True)
@@ -400,15 +405,14 @@ def test_a_slow_phone_shows_everything(page: Any, site: str) -> None:
     page.click("#link-close")
 
 
-def test_it_computes_in_firefox(site: str, regular: nanotap.Case) -> None:
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
-        try:
-            browser = playwright.firefox.launch()
-        except sync_api.Error:
-            pytest.skip("no Firefox: playwright install firefox")
-        page = browser.new_page()
-        page.set_default_timeout(60_000)
-        opened(page, f"{site}#preset=paper")
-        assert value(page, "amplitude") == pytest.approx(amplitude(regular), rel=1e-12)
-        browser.close()
+def test_it_computes_in_firefox(
+    playwright: Any, site: str, regular: nanotap.Case
+) -> None:
+    if not Path(playwright.firefox.executable_path).exists():
+        pytest.skip("no Firefox: `playwright install firefox` downloads it")
+    browser = playwright.firefox.launch()
+    page = browser.new_page()
+    page.set_default_timeout(60_000)
+    opened(page, f"{site}#preset=paper")
+    assert value(page, "amplitude") == pytest.approx(amplitude(regular), rel=1e-12)
+    browser.close()

@@ -403,16 +403,3 @@ def test_a_slow_phone_shows_everything(page: Any, site: str) -> None:
     page.wait_for_selector("#link-code svg")
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.click("#link-close")
-
-
-def test_it_computes_in_firefox(
-    playwright: Any, site: str, regular: nanotap.Case
-) -> None:
-    if not Path(playwright.firefox.executable_path).exists():
-        pytest.skip("no Firefox: `playwright install firefox` downloads it")
-    browser = playwright.firefox.launch()
-    page = browser.new_page()
-    page.set_default_timeout(60_000)
-    opened(page, f"{site}#preset=paper")
-    assert value(page, "amplitude") == pytest.approx(amplitude(regular), rel=1e-12)
-    browser.close()

@@ -463,16 +463,24 @@ async function compute(quick, more = {}) {
   const whole = caseText();
   asking = own;
   let request = null;
-  const slow = setTimeout(() => {
+  const warn = () => {
     if (!alone || asking !== own) return;
     const command = own.clicks ? `save the case file, then: ${$("study-command").textContent}` : "nanotap explore";
     $("long").textContent = `This takes long in a browser. On all processors of a machine: ${command}`;
-  }, TERMINAL);
+  };
+  const slow = setTimeout(warn, TERMINAL);
+  const begun = performance.now();
   try {
     const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, quick, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
       // An answer for an older case is dropped.
       if (asking !== own) return;
-      if (message.progress) { $("progress").textContent = message.progress; return; }
+      if (message.progress) {
+        $("progress").textContent = message.progress;
+        // What is done shows how long the rest takes.
+        const [, done, total] = /^(\d+) of (\d+)/.exec(message.progress) ?? [];
+        if ((performance.now() - begun) * total / done > TERMINAL) warn();
+        return;
+      }
       if (!own.clicks && caseText() !== whole) { request?.abort(); return; }
       own.clicks = message.clicks;
       Object.assign(own, { case: own.case && caseOf(own, message.clicks) });

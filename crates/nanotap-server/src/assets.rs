@@ -4,13 +4,15 @@ use axum::extract::Path;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
+use nanotap_explorer::link::PAGE;
 use nanotap_explorer::page;
 
+/// Where the page says to which address its links lead: a link to this server would be of no use.
+const LINKS: &str = "<meta name=\"nanotap-page\" content=\"";
+
 pub(crate) async fn index() -> impl IntoResponse {
-    (
-        [(header::CONTENT_TYPE, "text/html; charset=utf-8")],
-        page::INDEX,
-    )
+    let page = page::INDEX.replacen(LINKS, &format!("{LINKS}{PAGE}"), 1);
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], page)
 }
 
 pub(crate) async fn part(Path(name): Path<String>) -> Response {

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import PHYSICAL
-from program import PROGRAM, ROOT
+from program import PROGRAM
 
 
 def terminal(tmp_path, case, *arguments):
@@ -177,11 +177,24 @@ def test_arrays_with_named_dimensions_go_together(regular):
 def test_an_orbit_says_which_knock_upsets_it(regular):
     alone = nanotap.orbit(regular, upset=True).upset
     assert alone.smallest is None and alone.largest_tried > 0
-    bistable = nanotap.Case.from_file(ROOT / "docs" / "cases" / "bistable-lever.toml")
+    # The free motion of a lever that taps after a knock (crates/nanotap/tests/experiments/upset.rs).
+    bistable = nanotap.Case(
+        model={"modes": 1},
+        cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+        sample={"stiffness": "8 N/m", "damping": "0 N s/m"},
+        drive={
+            "actuation": "tip",
+            "frequency_ratio": 1.01,
+            "free_amplitude": "6.6 nm",
+        },
+        gap={"tip": "14 nm"},
+    )
     found = nanotap.orbit(bistable, upset=True).upset.smallest
-    # docs/cases/bistable.md
-    assert found.physical.tip_speed == pytest.approx(1.437e-3, rel=0.01)
     assert found.leads_to == "periodic" and found.period == 1
+    assert found.physical.A > 14e-9
+    # m v²/2 of the mass k₁/ω₁², where k₁ = 1.0302 k.
+    energy = 1.030197 * (found.physical.tip_speed / (2 * np.pi * 70e3)) ** 2
+    assert found.physical.energy == pytest.approx(energy, rel=1e-3)
     assert nanotap.orbit(regular).upset is None
 
 

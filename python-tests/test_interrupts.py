@@ -1,4 +1,4 @@
-"""Ctrl-C during functions that take seconds: `Interrupted` within a second or two, with the finished part."""
+"""Ctrl-C during functions that take seconds: `Interrupted` within a second, with the finished part."""
 
 import os
 import pathlib
@@ -14,9 +14,9 @@ import pytest
 import xarray as xr
 
 CASES = pathlib.Path(__file__).parents[1] / "docs" / "cases"
-# Seconds until the signal, and from then to the exception: one for the work itself, the rest for a
-# loaded machine.
-UNTIL, WITHIN = 0.5, 3.0
+# Seconds until the signal, and from then to the exception. On a loaded machine the processor time counts,
+# which is longer than the time wherever the work goes on.
+UNTIL, WITHIN = 0.5, 1.0
 
 
 def load(name, **changes):
@@ -96,17 +96,19 @@ def interrupted(name):
 
     def interrupt():
         time.sleep(UNTIL)
-        sent.append(time.monotonic())
+        sent.append((time.monotonic(), time.process_time()))
         os.kill(os.getpid(), signal.SIGINT)
 
     # What is imported when it is needed is imported before.
     curve()
+    nanotap.sweep(nanotap.Case.paper(), over="omega=3:3.1:2", periods=1)
     threading.Thread(target=interrupt, daemon=True).start()
     try:
         CALLS[name]()
         return "finished before the signal"
     except nanotap.Interrupted as stopped:
-        late = time.monotonic() - sent[0]
+        [(then, used)] = sent
+        late = min(time.monotonic() - then, time.process_time() - used)
         part = stopped.result
         if hasattr(part, "data_vars"):
             # The part is in memory, not in a folder that is gone.

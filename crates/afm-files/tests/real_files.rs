@@ -4,12 +4,14 @@
 //! files are published, once, and is skipped with a message where that fails. Files that no package
 //! has are looked for in the folder that `AFM_FILES_SAMPLES` names.
 
+mod published;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use afm_files::{Curve, Document, Error, Image, recognise};
+use published::package;
 use serde_json::Value;
 
 /// Relative agreement; the reference has 12 digits.
@@ -19,30 +21,6 @@ fn reference() -> BTreeMap<String, Value> {
     let text = include_str!("reference/files.json");
     let all: Value = serde_json::from_str(text).expect("the reference is JSON");
     serde_json::from_value(all["files"].clone()).expect("files by their names")
-}
-
-/// The unpacked source package; `None` if it cannot be downloaded.
-fn package(name: &str, version: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("afm-files");
-    let unpacked = folder.join(format!("{name}-{version}"));
-    if unpacked.is_dir() {
-        return Some(unpacked);
-    }
-    fs::create_dir_all(&folder).ok()?;
-    let archive = format!("{name}-{version}.tar.gz");
-    let run = |command: &mut Command| {
-        command
-            .current_dir(&folder)
-            .status()
-            .is_ok_and(|of| of.success())
-    };
-    let is_there = folder.join(&archive).is_file()
-        || run(Command::new("python3")
-            .args(["-m", "pip", "download", "--quiet", "--no-deps"])
-            .args(["--retries", "1", "--timeout", "20", "--no-binary", ":all:"])
-            .arg(format!("{name}=={version}")));
-    let is_unpacked = is_there && run(Command::new("tar").arg("-xzf").arg(&archive));
-    is_unpacked.then_some(unpacked)
 }
 
 #[expect(clippy::disallowed_methods, reason = "files of a package end")]

@@ -151,17 +151,17 @@ fn in_liquid_without_the_number_of_averages() {
 
 #[test]
 fn in_air_one_periodogram() {
-    check("Q 100, n 1", &spectra(100.0, 1, 50.0, 3), 100.0);
+    check("Q 100, n 1", &spectra(100.0, 1, 150.0, 3), 100.0);
 }
 
 #[test]
 fn in_air_many_averages() {
-    check("Q 100, n 20", &spectra(100.0, 20, 50.0, 4), 100.0);
+    check("Q 100, n 20", &spectra(100.0, 20, 150.0, 4), 100.0);
 }
 
 #[test]
 fn narrow_peak_one_periodogram() {
-    check("Q 450, n 1", &spectra(450.0, 1, 10.0, 5), 450.0);
+    check("Q 450, n 1", &spectra(450.0, 1, 30.0, 5), 450.0);
 }
 
 /// Records of an oscillator, by the exact solution of its stochastic equation over a sample, with

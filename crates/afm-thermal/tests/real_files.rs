@@ -4,36 +4,17 @@
 //! published, once, and is skipped with a message where that fails. The file that no package has is
 //! looked for in the folder that `AFM_FILES_SAMPLES` names.
 
+#[path = "../../afm-files/tests/published/mod.rs"]
+mod published;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use afm_thermal::{
     Average, Calibration, Density, Fluid, ModeFactor, Options, Plan, Sensitivity, Spectrum, Unit,
     Warning, calibrate,
 };
-
-/// The unpacked source package; `None` if it cannot be downloaded.
-fn package(name: &str, version: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("afm-files");
-    let unpacked = folder.join(format!("{name}-{version}"));
-    if unpacked.is_dir() {
-        return Some(unpacked);
-    }
-    fs::create_dir_all(&folder).ok()?;
-    let archive = format!("{name}-{version}.tar.gz");
-    let run = |command: &mut Command| {
-        let status = command.current_dir(&folder).status();
-        status.is_ok_and(|of| of.success())
-    };
-    let is_there = folder.join(&archive).is_file()
-        || run(Command::new("python3")
-            .args(["-m", "pip", "download", "--quiet", "--no-deps"])
-            .args(["--retries", "1", "--timeout", "20", "--no-binary", ":all:"])
-            .arg(format!("{name}=={version}")));
-    let is_unpacked = is_there && run(Command::new("tar").arg("-xzf").arg(&archive));
-    is_unpacked.then_some(unpacked)
-}
+use published::package;
 
 #[expect(clippy::disallowed_methods, reason = "files of a package end")]
 fn spectra(path: &Path) -> Option<Vec<afm_files::Spectrum>> {

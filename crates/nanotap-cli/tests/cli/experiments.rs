@@ -389,7 +389,14 @@ fn values_that_the_data_do_not_determine_are_in_brackets() {
         folder.write(name, text);
     }
     let free = "sample.modulus,sample.indentation,gap.offset";
-    let run = folder.run(&["fit", "curve.csv", "lever.toml", "--free", free]);
+    let run = folder.run(&[
+        "fit",
+        "curve.csv",
+        "lever.toml",
+        "--free",
+        free,
+        "--no-profile",
+    ]);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let line = |name: &str| run.stdout.lines().find(|line| line.contains(name)).unwrap();
     for open in ["sample.modulus", "sample.indentation"] {

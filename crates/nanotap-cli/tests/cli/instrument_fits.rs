@@ -4,37 +4,17 @@
 //! repository: each source package is downloaded once, and its files are skipped with a message where
 //! that fails.
 
+#[path = "../../../afm-files/tests/published/mod.rs"]
+mod published;
+
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 
+use published::package;
 use serde_json::Value;
 
 use crate::instrument_files::samples;
 use crate::util::Folder;
-
-/// The unpacked source package; `None` if it cannot be downloaded.
-fn package(name: &str, version: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("afm-files");
-    let unpacked = folder.join(format!("{name}-{version}"));
-    if unpacked.is_dir() {
-        return Some(unpacked);
-    }
-    std::fs::create_dir_all(&folder).ok()?;
-    let run = |command: &mut Command| {
-        let status = command.current_dir(&folder).status();
-        status.is_ok_and(|of| of.success())
-    };
-    let archive = format!("{name}-{version}.tar.gz");
-    let is_there = folder.join(&archive).is_file()
-        || run(Command::new("python3")
-            .args(["-m", "pip", "download", "--quiet", "--no-deps"])
-            .args(["--retries", "1", "--timeout", "20", "--no-binary", ":all:"])
-            .arg(format!("{name}=={version}")));
-    let is_unpacked = is_there && run(Command::new("tar").arg("-xzf").arg(&archive));
-    is_unpacked.then_some(unpacked)
-}
 
 fn number(of: &Value) -> f64 {
     of.as_f64().unwrap_or_else(|| panic!("{of} is a number"))

@@ -162,7 +162,7 @@ fn interrupted_by(signal: &str) {
         "sweep",
         "case.toml",
         "--over",
-        "omega=2.5:2.9:40000",
+        "omega=3.2:3.6:40000",
         "--periods",
         "8",
         "--out",

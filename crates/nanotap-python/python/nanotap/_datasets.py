@@ -1,8 +1,10 @@
 """Sweeps and basins: chunked datasets, computed here or on a cluster, opened with xarray."""
 
+import importlib
 import json
 import os
 import tempfile
+import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
@@ -259,7 +261,19 @@ def _stored(
         yield _ending(out, "out"), _lazy
         return
     with tempfile.TemporaryDirectory(prefix="nanotap-", dir=parent) as folder:
+        # During the work, which leaves the interpreter free: after Ctrl-C it would take seconds, and
+        # on this thread a Ctrl-C during an import may be lost.
+        threading.Thread(target=_import_readers).start()
         yield os.path.join(folder, "dataset.zarr"), _in_memory
+
+
+def _import_readers() -> None:
+    """Imports what reads a store, the packages that xarray looks for included."""
+    import xarray as xr
+
+    importlib.import_module("zarr")
+    importlib.import_module("nanotap._study_dataset")
+    xr.Dataset(coords={"x": [0.0]})
 
 
 def _lazy(store: str, stopped: bool) -> "StudyDataset":

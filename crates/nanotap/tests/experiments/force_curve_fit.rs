@@ -36,7 +36,7 @@ fn curve(case: &Case) -> ForceCurveReport {
     let options = ForceCurveOptions {
         to: Some("-30 nm".into()),
         speed: Some("2 um/s".into()),
-        points: 300,
+        points: 150,
         ..ForceCurveOptions::default()
     };
     ForceCurveStudy::run(case, &options, &Control::default()).unwrap()

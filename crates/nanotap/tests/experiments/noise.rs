@@ -279,7 +279,7 @@ fn the_saddle_comes_nearer_as_towards_a_fold() {
 #[test]
 fn a_stochastic_simulation_agrees_within_its_error_bars() {
     const PERIODS: usize = 1_000_000;
-    const KICKS: usize = 64;
+    const KICKS: usize = 32;
     let case = lever(&[
         "modes=1",
         "cantilever.Q=30",

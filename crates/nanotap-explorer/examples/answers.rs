@@ -2,6 +2,11 @@
 //! `xtask/page/compare.mjs` compares with the answers of the WebAssembly module. A text `file:PATH` in a
 //! request stands for the content of a file; the requests with these are written as well.
 
+#![expect(
+    clippy::disallowed_methods,
+    reason = "it reads files of this repository"
+)]
+
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;

@@ -204,7 +204,7 @@ mod tests {
     fn arithmetic_is_exact_to_the_last_words() {
         type Number = Fixed<8>;
         let rounding = |size: f64| size * Number::unit();
-        for (a, b) in [(1, 3), (-7, 11), (355, 113), (-12_345, 7)] {
+        for (a, b) in [(1, 3_i32), (-7, 11), (355, 113), (-12_345, 7)] {
             let quotient = Number::whole(a).divided_by(Number::whole(i64::from(b)));
             let rest = quotient * Number::whole(i64::from(b)) - Number::whole(a);
             assert!(rest.to_f64().abs() <= rounding(1e6), "{a}/{b}");

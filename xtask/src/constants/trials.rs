@@ -63,7 +63,7 @@ impl Trials {
             // Neither values nor names of tests contain quotes.
             let parts: Vec<&str> = line.split('"').collect();
             match parts[..] {
-                ["[", path, "]"] => file = path.to_owned(),
+                ["[", path, "]"] => path.clone_into(&mut file),
                 ["", name, _, value, _, doubled, _, halved, _] => {
                     let [value, doubled, halved] = [value, doubled, halved].map(str::to_owned);
                     let trial = Trial {

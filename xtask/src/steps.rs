@@ -238,8 +238,7 @@ fn build_times(workspace: &Workspace) -> Result<Tally, String> {
 fn test_python(workspace: &Workspace) -> Result<Tally, String> {
     let mut tally = signatures(workspace, &["--check"])?;
     let mut command = wheel::installed(workspace)?.program("pytest");
-    // Two processes, each test file in one of them: its fixtures are made once.
-    command.args(["python-tests", "-n", "2", "--dist", "loadfile"]);
+    command.arg("python-tests");
     let program = workspace.target().join("release").join("nanotap");
     command.env("NANOTAP", program);
     tally += tests(&workspace.root, &mut command)?;

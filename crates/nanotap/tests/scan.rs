@@ -423,9 +423,9 @@ const EDGE: &str = "[cantilever]\nk = \"0.8736193621040327 N/m\"\nf0 = \"100 kHz
     intermolecular_distance = \"169 pm\"\n\
     [drive]\nfrequency = \"100 kHz\"\nfree_amplitude = \"20 nm\"\nactuation = \"tip\"\n\
     [gap]\ntip = \"18 nm\"\n[model]\nmodes = 1\n\
-    [scan]\nsize = \"200 nm\"\nsetpoint = 0.8\nintegral_gain = 785\nretrace = false\n\
-    periods = 5000\npixels = 50\nsettle = 1500\n\
-    surface = [{ step = { from = \"50 nm\", to = \"130 nm\", height = \"10 nm\" } }]\n";
+    [scan]\nsize = \"500 nm\"\nsetpoint = 0.8\nintegral_gain = 785\nretrace = false\n\
+    periods = 12500\npixels = 50\nsettle = 1500\n\
+    surface = [{ step = { from = \"125 nm\", to = \"325 nm\", height = \"10 nm\" } }]\n";
 
 /// The causes are those of the surface and the loop, whatever the pixels, the lines and the last digits
 /// of the lock-in amplifier's output.
@@ -444,8 +444,8 @@ fn behind_a_falling_edge_the_feedback_lags() {
         panic!("{:?}", report.causes)
     };
     for (cause, from, height, words) in [
-        (flies, 130e-9, 10e-9, "parachuting"),
-        (presses, 50e-9, -10e-9, "presses"),
+        (flies, 325e-9, 10e-9, "parachuting"),
+        (presses, 125e-9, -10e-9, "presses"),
     ] {
         let (x, until) = (cause.x.unwrap(), cause.until_x.unwrap());
         assert!((from..from + 5e-9).contains(&x) && until > x, "{cause:?}");
@@ -482,7 +482,7 @@ fn each_surface_has_its_cause() {
     };
     // A rising edge only: the tip presses, and comes back to its state.
     let rising = edge(
-        "{ step = { from = \"100 nm\", to = \"1 um\", height = \"10 nm\" } }",
+        "{ step = { from = \"250 nm\", to = \"1 um\", height = \"10 nm\" } }",
         &[],
     );
     assert_eq!(causes_of(&rising), [Cause::FeedbackLags]);
@@ -494,12 +494,12 @@ fn each_surface_has_its_cause() {
     assert!(rising.branch_changes.is_empty());
     // A steep ramp lags by speed over loop rate, and flies where it ends; a gentle one is followed.
     let ramp = |height: &str, from: &str| {
-        format!("{{ ramp = {{ from = \"{from}\", to = \"160 nm\", height = \"{height}\" }} }}")
+        format!("{{ ramp = {{ from = \"{from}\", to = \"400 nm\", height = \"{height}\" }} }}")
     };
-    let steep = edge(&ramp("60 nm", "40 nm"), &[]);
+    let steep = edge(&ramp("150 nm", "100 nm"), &[]);
     assert_eq!(causes_of(&steep), [Cause::FeedbackLags]);
     assert!(steep.branch_changes.is_empty());
-    let gentle = edge(&ramp("-4 nm", "0 nm"), &["scan.size=\"156 nm\""]);
+    let gentle = edge(&ramp("-10 nm", "0 nm"), &["scan.size=\"390 nm\""]);
     assert!(gentle.causes.is_empty(), "{}", gentle.verdict);
     // A sine: fast, the tip presses and flies in turn; slow, it is followed; fast and so low that the
     // amplitude stays near the setpoint, the height does not follow all the same.
@@ -524,7 +524,7 @@ fn each_surface_has_its_cause() {
         "{}",
         low.verdict
     );
-    let slow = edge(&sine("0.8 nm", "200 nm"), &[]);
+    let slow = edge(&sine("1 nm", "250 nm"), &[]);
     assert!(slow.causes.is_empty(), "{}", slow.verdict);
     assert!(
         slow.verdict
@@ -555,7 +555,7 @@ fn each_surface_has_its_cause() {
     );
     // Low Q in liquid: the edge lags, the flat surface behind it is followed.
     let liquid = edge(
-        "{ step = { from = \"100 nm\", to = \"1 um\", height = \"10 nm\" } }",
+        "{ step = { from = \"250 nm\", to = \"1 um\", height = \"10 nm\" } }",
         &["cantilever.Q=2", "scan.settle=400"],
     );
     assert!(

@@ -221,8 +221,8 @@ def test_its_case_file_and_command_give_the_same_numbers(
 @pytest.mark.parametrize(
     ("body", "status"),
     [
-        (b"", 400),
-        (b"{", 400),
+        (b"", 422),
+        (b"{", 422),
         (b'{"case": 1}', 422),
         (b'{"case": {"preset": "paper"}, "what": 1}', 422),
         (b'{"case": {"preset": "paper"}, "steps": -1}', 422),

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
-use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
+use nanotap::dataset::{
+    Share, Store, StoreError, Values, Work, WorkError, column, finish, merge, table,
+};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::Computation as _;
 use nanotap::study::sweep::{Follow, Summary, Sweep, SweepOptions};
@@ -52,6 +54,40 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
         std::fs::remove_dir_all(one).unwrap();
         std::fs::remove_dir_all(two).unwrap();
     }
+}
+
+#[test]
+fn a_store_in_memory_has_the_values_of_one_on_disk() {
+    let folder = Folder::new();
+    let sweep = sweep(Follow::Both);
+    let disk = computed(&sweep, &folder.join("disk"), 2);
+    let memory = Store::in_memory(sweep.schema().clone());
+    assert_eq!(memory.missing(), memory.chunks());
+    let block = memory.schema().grid.block(0);
+    assert!(memory.read_chunk(&block, 0).is_err());
+    sweep.compute(&memory, &how(2)).unwrap();
+    assert_eq!(memory.missing(), 0);
+    assert_eq!(
+        memory.metadata(),
+        Store::in_memory(disk.schema().clone()).metadata()
+    );
+    for chunk in 0..memory.chunks() {
+        let block = memory.schema().grid.block(chunk);
+        for variable in 0..memory.schema().variables.len() {
+            let values = memory.read_chunk(&block, variable).unwrap();
+            // Not a number where a motion has no such value: compared as it is stored.
+            let of = |values: &Values| format!("{values:?}");
+            let expected = column(&disk, &block, variable).unwrap();
+            assert_eq!(of(&values), of(&expected), "{chunk}, {variable}");
+        }
+    }
+    memory.write_beside("notes.txt", b"here").unwrap();
+    assert_eq!(memory.read_beside("notes.txt").unwrap().unwrap(), b"here");
+    assert!(memory.read_beside("others.txt").unwrap().is_none());
+    assert!(!Path::new("notes.txt").exists());
+    // Joining its chunks would gain nothing.
+    let schema = memory.schema().clone();
+    assert_eq!(*finish(memory).unwrap().schema(), schema);
 }
 
 #[test]

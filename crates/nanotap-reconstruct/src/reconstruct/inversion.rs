@@ -216,10 +216,16 @@ impl Inversion<'_> {
         let mut residuals = Vec::new();
         let mut before = Vec::new();
         let mut widest = self.widest;
-        for pass in 0..PASSES {
+        // Asked for each row: with thousands of them a pass takes seconds.
+        let going_on = || {
             if control.is_cancelled() {
-                return Err(Error::stopped());
+                Err(Error::stopped())
+            } else {
+                Ok(())
             }
+        };
+        for pass in 0..PASSES {
+            going_on()?;
             for (estimate, row) in rows.iter_mut().zip(self.rows) {
                 estimate.update(self.method, row);
             }
@@ -236,10 +242,11 @@ impl Inversion<'_> {
                     gains: self.gains,
                 };
                 let moved = rows.par_iter().zip(self.rows).map(|(estimate, row)| {
+                    going_on()?;
                     let centre = row.distance + estimate.mean;
-                    known.motion(&harmonics, centre, estimate.at.amplitude)
+                    Ok(known.motion(&harmonics, centre, estimate.at.amplitude))
                 });
-                let mut moved: Vec<Motion> = moved.collect();
+                let mut moved = moved.collect::<Result<Vec<Motion>, Error>>()?;
                 if pass >= AVERAGED {
                     for (motion, before) in moved.iter_mut().zip(&motions) {
                         motion.half_way(before);
@@ -259,10 +266,12 @@ impl Inversion<'_> {
             } else {
                 let both = rows.par_iter().zip(&motions);
                 let of = |(estimate, motion): (&Estimate, &Motion)| {
-                    motion.weights(&harmonics, &nodes, estimate.at.amplitude)
+                    going_on()?;
+                    Ok(motion.weights(&harmonics, &nodes, estimate.at.amplitude))
                 };
-                both.map(of).collect()
+                both.map(of).collect::<Result<_, Error>>()?
             };
+            going_on()?;
             if damping.coefficients.len() != nodes.unknowns() {
                 damping = Smooth::zero(nodes.unknowns());
             }
@@ -274,6 +283,7 @@ impl Inversion<'_> {
             }
             before = std::mem::take(&mut force.coefficients);
             force = solve_force(&observed, &weights, &roughness, &damping)?;
+            going_on()?;
             if self.has_damping {
                 damping = self.solve_damping(&rows, &weights, &nodes, &force)?;
             }
@@ -287,6 +297,7 @@ impl Inversion<'_> {
                 [row[0] - conservative - damped, row[1]]
             };
             residuals = observed.iter().zip(&weights).map(unexplained).collect();
+            going_on()?;
             self.advance(pass, &mut rows, &weights, &residuals, &force, |k, row| {
                 if harmonic {
                     let half = 0.5 * nodes.spacing();

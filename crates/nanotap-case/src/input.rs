@@ -10,11 +10,9 @@
     reason = "the one place in which files are opened for reading"
 )]
 
-use std::collections::BTreeMap;
 use std::fs::{self, File, FileType};
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 
 use nanotap_error::Error;
 use nanotap_error::ErrorKind;
@@ -103,22 +101,6 @@ impl From<InputError> for Error {
     }
 }
 
-/// Files that were given by their content: in a browser, which has no disk.
-static GIVEN: Mutex<BTreeMap<PathBuf, Vec<u8>>> = Mutex::new(BTreeMap::new());
-
-/// Gives the content of the file at a path; it is read in place of one on the disk.
-pub fn give(path: &Path, bytes: Vec<u8>) {
-    let mut given = GIVEN.lock().unwrap_or_else(PoisonError::into_inner);
-    given.insert(path.to_owned(), bytes);
-}
-
-/// The first `count` bytes of a file that was given.
-fn given(path: &Path, count: u64) -> Option<Vec<u8>> {
-    let given = GIVEN.lock().unwrap_or_else(PoisonError::into_inner);
-    let bytes = given.get(path)?;
-    Some(bytes[..bytes.len().min(count as usize)].to_vec())
-}
-
 /// Reads a file of at most `limit` bytes.
 ///
 /// # Errors
@@ -160,9 +142,6 @@ impl<T: Read + Seek + Send> Seekable for T {}
 /// # Errors
 /// As [`read`], but only a pipe can be too long.
 pub fn open(path: &Path, limit: u64, origin: Origin) -> Result<Box<dyn Seekable>, InputError> {
-    if let Some(bytes) = given(path, u64::MAX) {
-        return Ok(Box::new(Cursor::new(bytes)));
-    }
     let opened = checked(path, origin, None).and_then(|kind| {
         if kind.is_file() {
             return Ok(Some(File::open(path)?));
@@ -182,9 +161,6 @@ fn head(
     origin: Origin,
     limit: Option<u64>,
 ) -> Result<Vec<u8>, InputError> {
-    if let Some(bytes) = given(path, count) {
-        return Ok(bytes);
-    }
     let read = || -> Result<Vec<u8>, InputFault> {
         checked(path, origin, limit)?;
         let mut bytes = Vec::new();
@@ -237,21 +213,6 @@ fn size(bytes: u64) -> String {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_file_that_was_given_is_read_within_the_same_limits() {
-        let path = Path::new("given by its content.csv");
-        assert!(read(path, 10, Origin::File).unwrap_err().is_missing());
-        give(path, b"a,b\n1,2\n".to_vec());
-        assert_eq!(text(path, 10, Origin::File).unwrap(), "a,b\n1,2\n");
-        assert_eq!(start(path, 3).unwrap(), b"a,b");
-        let fault = read(path, 7, Origin::File).unwrap_err().fault;
-        assert!(matches!(fault, InputFault::TooLong(7)));
-        let mut all = String::new();
-        let mut opened = open(path, 10, Origin::User).unwrap();
-        opened.read_to_string(&mut all).unwrap();
-        assert_eq!(all.len(), 8);
-    }
 
     fn folder(name: &str) -> PathBuf {
         let name = format!("nanotap-input-{}-{name}", std::process::id());

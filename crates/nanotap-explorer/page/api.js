@@ -69,11 +69,3 @@ export async function stream(kind, path, body, take) {
     take(message);
   });
 }
-
-/** The bytes of a file in base64. */
-export const base64Of = (file) => new Promise((done, failed) => {
-  const reader = new FileReader();
-  reader.addEventListener("load", () => done(reader.result.slice(reader.result.indexOf(",") + 1)));
-  reader.addEventListener("error", () => failed(reader.error));
-  reader.readAsDataURL(file);
-});

@@ -1,13 +1,12 @@
 // Links that open the present view anywhere. A case from a file is in the link itself: a digit for the form
 // of the link, then the text of the file, deflated (RFC 1951), in base64url.
 
-import { alone, base64Of, bytes } from "./api.js";
-import { caseOfText, encoded, files, names, state, texts } from "./state.js";
+import { bytes } from "./api.js";
+import { encoded, names, state, texts } from "./state.js";
 import { code } from "./qr.js";
 
 const FORM = "1";
 const MOST_TEXT = 200_000;    // bytes of a case file
-const MOST_FILE = 24e6;       // bytes of a file that a case names
 const MARGIN = 4;             // light squares around a QR code
 const $ = (id) => document.getElementById(id);
 
@@ -39,7 +38,7 @@ async function unpacked(word) {
 
 /** Takes a text as a case, if the core reads it. */
 async function take(kind, word, text, name) {
-  await bytes(kind, "/api/export", { case: caseOfText(text), format: "toml" });
+  await bytes(kind, "/api/export", { case: { text }, format: "toml" });
   texts.set(word, text);
   names.set(word, name);
 }
@@ -57,15 +56,6 @@ async function first(word) {
   try { text = await unpacked(word); } catch { return "This link is damaged: it contains no case file."; }
   try { await take(word, word, text, "from a link"); } catch (error) { return `The case of this link is refused: ${error.message}.`; }
   return "";
-}
-
-/** Keeps the files that a case names. A server reads them beside the case on its disk. */
-export async function keep(list) {
-  if (list.length && !alone) throw new Error(`${list[0].name}: start nanotap explore with the case file, which has its files beside it`);
-  for (const file of list) {
-    if (file.size > MOST_FILE) throw new Error(`${file.name} has ${file.size} bytes; the page reads at most ${MOST_FILE}`);
-    files.set(file.name, { base64: await base64Of(file) });
-  }
 }
 
 /** Reads a case file, and returns what stands for it in a link. */

@@ -264,10 +264,8 @@ function fresh(name) {
   takeOver();
 }
 
-/** Opens a case file, with other files that it may name. */
-async function openFile(file, others) {
+async function openFile(file) {
   try {
-    await link.keep(others);
     if (file) fresh(await link.open(file));
   } catch (error) { if (!superseded(error)) say(error); }
 }
@@ -327,11 +325,7 @@ async function begin() {
     list();
     $("open").click();
   });
-  $("open").addEventListener("change", () => {
-    const list = [...$("open").files];
-    const file = list.find(({ name }) => name.toLowerCase().endsWith(".toml"));
-    openFile(file, list.filter((other) => other !== file));
-  });
+  $("open").addEventListener("change", () => openFile($("open").files[0]));
   $("reset").addEventListener("click", () => fresh(basis()));
   $("undo").addEventListener("click", () => { steps -= 1; $("undo").disabled = steps <= 0; history.back(); });
   knobs.onChange((_, finished, note) => {

@@ -20,15 +20,6 @@ export const state = empty();
 export const texts = new Map();
 export const names = new Map();
 
-/** Files that cases name, where the page has no server: name -> content. */
-export const files = new Map();
-
-/** A case by the text of its file, with the files that it names. */
-export function caseOfText(text, set = []) {
-  const named = [...files].filter(([name]) => text.includes(name));
-  return { text, set, ...(named.length ? { files: Object.fromEntries(named) } : {}) };
-}
-
 /** What stands for the case without its changes. */
 export const basis = () => state.case || state.preset;
 
@@ -99,5 +90,5 @@ export function caseText(without = []) {
 /** The case as a request contains it. */
 export function theCase() {
   const set = Object.entries(state.set).map(([key, value]) => `${key}=${value}`);
-  return state.case ? caseOfText(texts.get(state.case), set) : { preset: state.preset, set };
+  return state.case ? { text: texts.get(state.case), set } : { preset: state.preset, set };
 }

@@ -2,7 +2,7 @@
 // to a motion.
 
 import { state, basis, caseText, put, remember, statedText, theCase } from "./state.js";
-import { alone, base64Of, bytes, current, save, stream, stop, superseded } from "./api.js";
+import { alone, bytes, current, save, stream, stop, superseded } from "./api.js";
 import { sameAs } from "./knobs.js";
 import * as figure from "./figure.js";
 import { moves } from "./lever.js";
@@ -117,12 +117,18 @@ function choose(name) {
   if (motion) fill(motion);
 }
 
-const isCase = (file) => file.name.toLowerCase().endsWith(".toml");
+/** The bytes of a file in base64. */
+const base64Of = (file) => new Promise((done, failed) => {
+  const reader = new FileReader();
+  reader.addEventListener("load", () => done(reader.result.slice(reader.result.indexOf(",") + 1)));
+  reader.addEventListener("error", () => failed(reader.error));
+  reader.readAsDataURL(file);
+});
 
 /** Takes a measured file, or a case file. */
 async function take(file) {
   if (!file) return;
-  if (isCase(file)) { openCase(file, []); return; }
+  if (file.name.toLowerCase().endsWith(".toml")) { openCase(file); return; }
   if (state.tab !== "data") choose("data");
   if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page reads at most ${MOST_DATA}, the terminal more`; return; }
   measured = [file.name, { base64: await base64Of(file) }];
@@ -143,9 +149,7 @@ export function begin(motionChanged, studies, openFile) {
   addEventListener("drop", (event) => {
     if (!event.dataTransfer?.files.length) return;
     event.preventDefault();
-    const list = [...event.dataTransfer.files];
-    const file = list.find(isCase);
-    if (file) openCase(file, list.filter((other) => other !== file)); else take(list[0]);
+    take(event.dataTransfer.files[0]);
   });
   for (const [name, words] of Object.entries(TABS)) {
     const tab = document.createElement("button");

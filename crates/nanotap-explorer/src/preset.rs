@@ -1,13 +1,10 @@
 //! The cases that the page offers: the given one, the paper's, the worked ones.
 
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::{Arc, OnceLock, PoisonError};
 
 use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
-use nanotap::input;
 use nanotap::study::setpoint::at_setpoint;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -15,7 +12,6 @@ use serde_json::{Value, json};
 use crate::Explorer;
 use crate::api_error::{ApiError, key_of};
 use crate::commands::CASE_FILE;
-use crate::content::Content;
 use crate::forms;
 
 /// A case to start from.
@@ -175,25 +171,12 @@ pub(crate) struct CaseSpec {
     /// The text of a case file, in place of a preset.
     #[serde(default)]
     text: Option<String>,
-    /// Files that the case names, by these names.
-    #[serde(default)]
-    files: BTreeMap<String, Content>,
     #[serde(default)]
     set: Vec<String>,
 }
 
 impl CaseSpec {
     pub(crate) fn preset(&self, app: &Explorer) -> Result<Arc<Preset>, ApiError> {
-        for (name, content) in &self.files {
-            // A server reads files from its disk; those of several pages could have the same name.
-            if cfg!(not(target_family = "wasm")) {
-                return Err(ApiError::input(
-                    format!("the file {name} was sent"),
-                    "put it beside the case file",
-                ));
-            }
-            input::give(Path::new(name), content.bytes()?);
-        }
         if let Some(text) = &self.text {
             // The most recent one is kept: its setpoint may have been solved for.
             let mut given = app.given.lock().unwrap_or_else(PoisonError::into_inner);

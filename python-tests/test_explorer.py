@@ -268,6 +268,15 @@ def first_stage(address: str, **asked_for: Any) -> dict[str, Any]:
         client.close()
 
 
+# A map with a value and no columns for it.
+EMPTY_MAP = {
+    "layers": [
+        {"kind": "heatmap", "columns": 0, "rows": 0, "values": [1.0]}
+        | {"x": [0, 1], "y": [0, 1], "scale": {"label": "height"}}
+    ]
+}
+
+
 def test_a_studys_figure_is_saved_and_seen_in_part(address: str) -> None:
     study = studied(address, tab="approach", options={"to": "0"})[-1]
     begins = {"svg": b"<", "png": b"\x89PNG", "pdf": b"%PDF", "csv": b"# panel 0, x: "}
@@ -282,6 +291,7 @@ def test_a_studys_figure_is_saved_and_seen_in_part(address: str) -> None:
     for wrong in (
         {"figure": {"panels": 1}, "format": "svg"},
         {"figure": study["figure"], "format": "gif"},
+        {"figure": {"rows": 1, "cols": 1, "panels": [EMPTY_MAP]}, "format": "csv"},
         wish | {"views": [{"panel": 0, "x": [1, 1], "y": [0, 1]}]},
     ):
         with pytest.raises(urllib.error.HTTPError) as refused:

@@ -50,16 +50,77 @@ pub struct Answer {
 const JSON: &str = "application/json";
 const LINES: &str = "application/x-ndjson";
 
+/// Takes the lines of a streamed answer.
+type Line<'a> = &'a (dyn Fn(Value) + Sync);
+/// The media type and the content of an answer.
+type Content = (&'static str, Vec<u8>);
+
+/// A request that the page may send.
+struct Request {
+    path: &'static str,
+    work: Work,
+    answer: fn(&Explorer, &[u8], &Control<'_>, Line<'_>) -> Result<Content, ApiError>,
+}
+
+const REQUESTS: [Request; 8] = [
+    Request {
+        path: "/api/about",
+        work: Work::Short,
+        answer: |explorer, _, _, _| Ok(json(&preset::about(explorer))),
+    },
+    Request {
+        path: "/api/case",
+        work: Work::Short,
+        answer: |explorer, _, _, _| Ok(("application/toml", export::shown(explorer)?.into_bytes())),
+    },
+    Request {
+        path: "/api/motion",
+        work: Work::Short,
+        answer: |explorer, body, control, _| {
+            Ok(json(&motion::answer(explorer, &read(body)?, control)?))
+        },
+    },
+    Request {
+        path: "/api/law",
+        work: Work::Short,
+        answer: |explorer, body, _, _| Ok(json(&law::changes(explorer, &read(body)?)?)),
+    },
+    Request {
+        path: "/api/attractors",
+        work: Work::Long,
+        answer: |explorer, body, control, _| {
+            Ok(json(&census::listed(explorer, &read(body)?, control)?))
+        },
+    },
+    Request {
+        path: "/api/study",
+        work: Work::Lines,
+        answer: |explorer, body, control, line| {
+            let studied =
+                read(body).and_then(|request| study::study(explorer, &request, control, line));
+            if let Err(refusal) = studied {
+                line(refusal.json());
+            }
+            Ok((LINES, Vec::new()))
+        },
+    },
+    Request {
+        path: "/api/figure",
+        work: Work::Short,
+        answer: |_, body, _, _| figures::redrawn(&read(body)?),
+    },
+    Request {
+        path: "/api/export",
+        work: Work::Short,
+        answer: |explorer, body, control, _| export::exported(explorer, &read(body)?, control),
+    },
+];
+
 impl Explorer {
     /// The kind of a request; `None` if there is no such request.
     pub fn work(path: &str) -> Option<Work> {
-        Some(match path {
-            "/api/about" | "/api/case" | "/api/motion" | "/api/law" | "/api/figure"
-            | "/api/export" => Work::Short,
-            "/api/attractors" => Work::Long,
-            "/api/study" => Work::Lines,
-            _ => return None,
-        })
+        let request = REQUESTS.iter().find(|request| request.path == path)?;
+        Some(request.work)
     }
 
     /// Answers a request: its path and its body. The lines of a streamed answer go to `line`, the
@@ -71,37 +132,14 @@ impl Explorer {
         control: &Control<'_>,
         line: &(dyn Fn(Value) + Sync),
     ) -> Answer {
-        let answer = match path {
-            "/api/about" => Ok(json(&preset::about(self))),
-            "/api/case" => export::shown(self).map(|text| ("application/toml", text.into_bytes())),
-            "/api/motion" => read(body)
-                .and_then(|request| motion::answer(self, &request, control))
-                .map(|value| json(&value)),
-            "/api/law" => read(body)
-                .and_then(|request| law::changes(self, &request))
-                .map(|value| json(&value)),
-            "/api/attractors" => read(body)
-                .and_then(|request| census::listed(self, &request, control))
-                .map(|value| json(&value)),
-            "/api/figure" => read(body).and_then(|wish| figures::redrawn(&wish)),
-            "/api/export" => read(body).and_then(|wish| export::exported(self, &wish, control)),
-            "/api/study" => {
-                let studied =
-                    read(body).and_then(|request| study::study(self, &request, control, line));
-                if let Err(refusal) = studied {
-                    line(refusal.json());
-                }
-                Ok((LINES, Vec::new()))
-            }
-            _ => {
-                return Answer {
-                    outcome: Outcome::Unknown,
-                    kind: "text/plain",
-                    bytes: b"the explorer has no such page".to_vec(),
-                };
-            }
+        let Some(request) = REQUESTS.iter().find(|request| request.path == path) else {
+            return Answer {
+                outcome: Outcome::Unknown,
+                kind: "text/plain",
+                bytes: b"the explorer has no such page".to_vec(),
+            };
         };
-        match answer {
+        match (request.answer)(self, body, control, line) {
             Ok((kind, bytes)) => Answer {
                 outcome: Outcome::Answered,
                 kind,
@@ -121,6 +159,6 @@ fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, ApiError> {
         .map_err(|error| ApiError::input(format!("not a request of the page: {error}"), ""))
 }
 
-fn json(value: &Value) -> (&'static str, Vec<u8>) {
+fn json(value: &Value) -> Content {
     (JSON, value.to_string().into_bytes())
 }

@@ -113,7 +113,11 @@ pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Ve
         ),
         "png" => ("image/png", figure.to_png(DPI).map_err(ApiError::of)?),
         "pdf" => ("application/pdf", figure.to_pdf().map_err(ApiError::of)?),
-        "csv" => ("text/csv", csv(figure).into_bytes()),
+        "csv" => {
+            // The figure of a request may have cells that do not fit its columns.
+            figure.check().map_err(ApiError::of)?;
+            ("text/csv", csv(figure).into_bytes())
+        }
         other => {
             return Err(ApiError::input(
                 format!("unknown format `{other}`"),

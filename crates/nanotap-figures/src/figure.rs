@@ -140,7 +140,12 @@ impl Figure {
         self
     }
 
-    pub(crate) fn check(&self) -> Result<(), FigureError> {
+    /// Checks that the figure can be drawn: sizes, ranges, counts of panels and cells. Whatever draws it
+    /// does so first.
+    ///
+    /// # Errors
+    /// If it cannot; the message names the number.
+    pub fn check(&self) -> Result<(), FigureError> {
         let cells = self.rows.saturating_mul(self.cols);
         if !(1..=400).contains(&cells) || self.panels.len() > cells {
             return Err(FigureError::Invalid(format!(

@@ -10,7 +10,7 @@ import v8 from "node:v8";
 v8.setFlagsFromString("--experimental-wasm-relaxed-simd");
 
 const [folder, ...modules] = process.argv.slice(2);
-const QUICK = 1.5; // seconds; a quick request is asked twice
+const QUICK = 1.5; // seconds; a request that takes less is timed twice
 const LONG = 0.5;  // seconds; longer native answers are compared with the first module only
 const read = new TextDecoder();
 const write = new TextEncoder();

@@ -83,7 +83,8 @@ fn compared(workspace: &Workspace, folder: &Path) -> Result<Tally, String> {
 
 /// Compiles the module.
 fn module(workspace: &Workspace, compiler: &Compiler) -> Result<PathBuf, String> {
-    // A folder of its own: another compiler would rebuild what the other tasks have built.
+    // A separate folder: this compiler may be another one, and everything would be compiled anew each
+    // time that a task uses the other.
     let target = workspace.target().join("web");
     let mut cargo = workspace.cargo(&["build", "--profile", "web", "--target", TARGET]);
     cargo.args(["--package", "nanotap-web"]);

@@ -68,7 +68,7 @@ pub(crate) fn page(
     replaced(INDEX, &page, END, &parts.concat())
 }
 
-/// A script that may stand in a page.
+/// A script whose text does not end the element that it is in.
 fn safe(script: &str) -> String {
     script.replace("</script", "<\\/script")
 }

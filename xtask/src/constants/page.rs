@@ -96,8 +96,8 @@ const HEAD: &str = "\
 <!-- Written by `cargo xtask constants`. -->
 
 The named numbers in the sources that steer a computation: tolerances, limits, counts of steps, and the
-thresholds of verdicts. Each stands in the code where it is used; the comment there says what it means,
-and its range of validity where that is known. `cargo xtask constants --try CRATE` doubles and halves
+thresholds at which a verdict changes. Each is declared where it is used, with a comment that says what it
+means, and for which values it is valid where that is known. `cargo xtask constants --try CRATE` doubles and halves
 each constant of a crate in a copy of the sources and runs the tests of this crate; the last two columns
 name the first test that fails. Both elements of a range are scaled together. Where they say \"no test\",
 the tests of the crate accept the value; those of crates that use it may not. Empty cells were not tried.

@@ -216,7 +216,7 @@ impl Inversion<'_> {
         let mut residuals = Vec::new();
         let mut before = Vec::new();
         let mut widest = self.widest;
-        // Asked for each row: with thousands of them a pass takes seconds.
+        // Checked for each row: with thousands of rows one pass takes seconds.
         let going_on = || {
             if control.is_cancelled() {
                 Err(Error::stopped())

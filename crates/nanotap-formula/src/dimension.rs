@@ -1,0 +1,149 @@
+//! The dimension of every part of a formula.
+
+use nanotap_quantity::Dimension;
+
+use crate::error::FormulaError;
+use crate::node::{Id, Node, Nodes, Operator};
+
+/// Difference of two exponents below which they are equal: roots and powers are rounded.
+const EQUAL: f64 = 1e-9;
+
+/// Exponents of kilogram, metre, second and coulomb; nothing for zero, which has any dimension. An
+/// angle in rad counts as a number.
+type Exponents = Option<[f64; 4]>;
+
+fn exponents(dimension: Dimension) -> [f64; 4] {
+    let Dimension {
+        mass,
+        length,
+        time,
+        charge,
+        ..
+    } = dimension;
+    [mass, length, time, charge].map(f64::from)
+}
+
+fn same(a: [f64; 4], b: [f64; 4]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < EQUAL)
+}
+
+/// The words for a dimension: `a force`, or its base units.
+fn words(exponents: [f64; 4]) -> String {
+    let whole = exponents.map(|e| e.round() as i32);
+    if same(exponents, whole.map(f64::from)) {
+        let dimension = Dimension::new(whole[0], whole[1], whole[2]).charged(whole[3]);
+        if dimension.is_none() {
+            return "a number without a unit".to_owned();
+        }
+        return dimension.to_string();
+    }
+    let units = ["kg", "m", "s", "C"].iter().zip(exponents);
+    let units = units.filter(|(_, exponent)| exponent.abs() > EQUAL);
+    let units: Vec<String> = units.map(|(unit, e)| format!("{unit}^{e}")).collect();
+    units.join(" ")
+}
+
+/// Checks that every part has a dimension, and the whole the wanted one.
+pub(crate) fn check(
+    nodes: &Nodes,
+    root: Id,
+    text: &str,
+    parameters: &[Dimension],
+    wanted: Dimension,
+) -> Result<(), FormulaError> {
+    let mut known: Vec<Exponents> = Vec::with_capacity(nodes.len());
+    let part = |id: Id| text.get(nodes.place(id)).unwrap_or_default();
+    let refused = |id: Id, reason: String| FormulaError::new(text, nodes.place(id), reason);
+    // Both of one dimension; zero takes that of the other.
+    let agree =
+        |known: &[Exponents], [a, b]: [Id; 2], at: Id, what: &str| match (known[a], known[b]) {
+            (Some(first), Some(second)) if !same(first, second) => Err(refused(
+                at,
+                format!(
+                    "\"{}\" is {}, \"{}\" is {}: they cannot be {what}",
+                    part(a),
+                    words(first),
+                    part(b),
+                    words(second)
+                ),
+            )),
+            (first, second) => Ok(first.or(second)),
+        };
+    for id in 0..nodes.len() {
+        let own = match nodes.node(id) {
+            Node::Number(bits) => (f64::from_bits(bits) != 0.0).then_some([0.0; 4]),
+            Node::Parameter(number) => {
+                Some(parameters.get(number).map_or([0.0; 4], |d| exponents(*d)))
+            }
+            Node::Gap => Some([0.0, 1.0, 0.0, 0.0]),
+            Node::Rate => Some([0.0, 1.0, -1.0, 0.0]),
+            Node::Of(function, a) => {
+                use crate::node::Function::{Cbrt, Sqrt};
+                let argument = known[a].unwrap_or_default();
+                match function {
+                    Sqrt => Some(argument.map(|e| e / 2.0)),
+                    Cbrt => Some(argument.map(|e| e / 3.0)),
+                    _ if same(argument, [0.0; 4]) => Some([0.0; 4]),
+                    _ => {
+                        return Err(refused(
+                            id,
+                            format!(
+                                "\"{}\" is {}, where this function takes a number without a unit",
+                                part(a),
+                                words(argument)
+                            ),
+                        ));
+                    }
+                }
+            }
+            Node::Two(Operator::Plus | Operator::Minus, a, b) => {
+                agree(&known, [a, b], id, "added or compared")?
+            }
+            Node::Two(operator @ (Operator::Times | Operator::Over), a, b) => {
+                let sign = if operator == Operator::Times {
+                    1.0
+                } else {
+                    -1.0
+                };
+                let (a, b) = (known[a].unwrap_or_default(), known[b].unwrap_or_default());
+                Some(std::array::from_fn(|k| a[k] + sign * b[k]))
+            }
+            Node::Two(Operator::Power, a, b) => {
+                let (base, exponent) = (known[a].unwrap_or_default(), known[b]);
+                if let Some(exponent) = exponent.filter(|e| !same(*e, [0.0; 4])) {
+                    let reason = format!(
+                        "the exponent \"{}\" is {}, not a number without a unit",
+                        part(b),
+                        words(exponent)
+                    );
+                    return Err(refused(id, reason));
+                }
+                match nodes.value(b) {
+                    Some(power) => Some(base.map(|e| power * e)),
+                    None if same(base, [0.0; 4]) => Some([0.0; 4]),
+                    None => {
+                        let reason = format!(
+                            "\"{}\" is {}: to an exponent that may vary only a number without a unit can \
+                             be raised; divide by a length or the like first",
+                            part(a),
+                            words(base)
+                        );
+                        return Err(refused(id, reason));
+                    }
+                }
+            }
+            Node::Choice { yes, no, .. } => {
+                agree(&known, [yes, no], id, "the two values of one choice")?
+            }
+        };
+        known.push(own);
+    }
+    let wanted = exponents(wanted);
+    match known[root] {
+        Some(found) if !same(found, wanted) => Err(refused(
+            root,
+            format!("it is {}, where {} is needed", words(found), words(wanted)),
+        )),
+        _ => Ok(()),
+    }
+}

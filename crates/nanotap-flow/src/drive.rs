@@ -13,6 +13,7 @@ pub struct Drive {
     period: f64,
     harmonics: Vec<u32>,
     frequencies: Vec<f64>,
+    repeats: bool,
 }
 
 impl Drive {
@@ -39,6 +40,7 @@ impl Drive {
             period,
             harmonics: harmonics.to_vec(),
             frequencies,
+            repeats: true,
         })
     }
 
@@ -57,23 +59,29 @@ impl Drive {
         Ok(drive)
     }
 
-    /// Creates a drive with two tones of angular frequencies `first` and `second` without a common
-    /// period. The period is that of the first tone; after it the second tone has a different
-    /// phase.
+    /// Creates a drive with tones of these angular frequencies that do not repeat after `period`. A
+    /// flow runs no further than to its end, and starts again from the state there under tones with
+    /// other phases.
     ///
     /// # Errors
-    /// If one of them is not positive and finite.
-    pub fn unlocked(first: f64, second: f64) -> Result<Self, FlowError> {
-        let mut drive = Self::single(first)?;
-        let other = Self::single(second)?;
-        drive.harmonics.extend(other.harmonics);
-        drive.frequencies.extend(other.frequencies);
+    /// If the period or a frequency is not positive and finite.
+    pub fn unlocked(period: f64, frequencies: &[f64]) -> Result<Self, FlowError> {
+        let tones = frequencies.iter().map(|omega| Self::single(*omega));
+        let tones = tones.collect::<Result<Vec<Self>, FlowError>>()?;
+        let mut drive = Self::new(period, &vec![1; tones.len()])?;
+        drive.frequencies = tones.iter().map(|tone| tone.frequencies[0]).collect();
+        drive.repeats = false;
         Ok(drive)
     }
 
     /// Returns the drive period `T`, in the system's unit of time.
     pub fn period(&self) -> f64 {
         self.period
+    }
+
+    /// Whether all tones are the same again after the period.
+    pub const fn repeats(&self) -> bool {
+        self.repeats
     }
 
     /// Returns the harmonics `h_k`, one per tone; 1 for each tone of [`Drive::unlocked`].

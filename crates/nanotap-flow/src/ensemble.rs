@@ -513,7 +513,7 @@ impl Member {
             self.packed[vector][0][place] = re[lane];
             self.packed[vector][1][place] = im[lane];
         }
-        count_period(&mut self.phase, &mut self.left, period);
+        count_period(&mut self.phase, &mut self.left, system.drive());
     }
 
     /// Continues to the next switch as a motion outside a batch does.

@@ -9,7 +9,7 @@ use crate::search::{BySteps, Crossing, Start, Statistics, on_table, sign_changes
 use crate::signal::Signal;
 use crate::simd::{self, ComplexVector, Library, Simd, Work, layout};
 use crate::system::{ON_SURFACE, Onset, Switch, System, Transition, rounding};
-use crate::{Complex, FlowError, Output};
+use crate::{Complex, Drive, FlowError, Output};
 
 /// The position of a motion of a [`System`], with its work space.
 #[derive(Clone, Debug)]
@@ -126,20 +126,28 @@ impl Motion {
         regime.to_state(system.drive(), modal, self.phase, x);
     }
 
-    /// Runs to the end of the drive period; the phase is then zero.
+    /// Runs to the end of the drive period; the phase is then zero, or under tones that do not repeat
+    /// the period.
     pub(crate) fn run_period<O: Observer>(
         &mut self,
         system: &System,
         observer: &mut O,
     ) -> Result<(), FlowError> {
         self.run_until(system, system.drive().period(), observer)?;
-        self.begin_period(system);
+        if system.drive().repeats() {
+            self.begin_period(system);
+        }
         observer.period_end();
         Ok(())
     }
 
     /// Runs over `periods` drive periods without stopping in between.
     pub(crate) fn run_periods(&mut self, system: &System, periods: usize) -> Result<(), FlowError> {
+        if periods > 1 && !system.drive().repeats() {
+            return Err(FlowError::Drive {
+                what: "several periods of tones that do not repeat".into(),
+            });
+        }
         in_arithmetic(
             system,
             Over {
@@ -241,7 +249,7 @@ impl Motion {
         let reach = self.reach::<S>(system, ends[0]);
         let found = self.next_crossing::<S>(system, reach)?;
         self.go_on::<S, ()>(system, ends[1], reach, found, stalled, &mut ())?;
-        if count_period(&mut self.phase, left, period) {
+        if count_period(&mut self.phase, left, system.drive()) {
             self.set_phasors(system);
         }
         Ok(())
@@ -633,12 +641,18 @@ impl Motion {
 }
 
 /// Reports whether a drive period has ended at `phase`. If so, counts it and sets the phase to that
-/// in the next period; after the last period the phase is zero.
+/// in the next period; after the last period the phase is zero. Under tones that do not repeat it
+/// stays.
 #[inline(always)]
-pub(crate) fn count_period(phase: &mut f64, left: &mut usize, period: f64) -> bool {
+pub(crate) fn count_period(phase: &mut f64, left: &mut usize, drive: &Drive) -> bool {
+    let period = drive.period();
     let ended = *phase >= period;
     if ended {
-        *phase = if *left > 1 { *phase - period } else { 0.0 };
+        *phase = match (drive.repeats(), *left > 1) {
+            (false, _) => period,
+            (true, true) => *phase - period,
+            (true, false) => 0.0,
+        };
         *left -= 1;
     }
     ended

@@ -130,7 +130,7 @@ impl Layout {
     fn gap(self, gap: &Gap) -> Output {
         let output = self
             .row(&gap.tip, 0)
-            .with_tone(0, gap.sine, 0.0)
+            .with_tone(0, gap.sine, gap.cosine)
             .with_constant(gap.constant);
         let further = gap.further.iter().enumerate();
         further.fold(output, |output, (k, [sine, cosine])| {
@@ -197,6 +197,11 @@ impl<'a> Beam<'a> {
     /// 0.
     pub(crate) const fn kick(&self) -> &DVector<f64> {
         &self.kick
+    }
+
+    /// Returns the angular frequency Ω of the drive.
+    pub(crate) const fn drive_frequency(&self) -> f64 {
+        self.galerkin.case.omega
     }
 
     /// Returns the factor of the sample's force in the force with which a moving clamp pushes, see
@@ -331,10 +336,16 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// The drive itself, α2 sin Ωτ and the further tones.
+    /// The drive itself, α2 sin Ωτ and the further tones, or α2 times the signal.
     fn drive_output(&self) -> Output {
         let case = &self.galerkin.case;
         let still = self.layout.internal(std::iter::empty());
+        if let Some(signal) = &case.signal {
+            let tones = signal.tones.iter().enumerate();
+            let mean = still.with_constant(signal.mean);
+            let drive = tones.fold(mean, |drive, (k, (_, z))| drive.with_tone(k, -z.im, z.re));
+            return drive.scaled(case.alpha2);
+        }
         let drive = still.with_tone(0, case.alpha2, 0.0);
         (0..case.further_tones.len()).fold(drive, |drive, k| {
             let [amplitude, phase] = Parameter::TONES[k].map(|of| case.get(of));

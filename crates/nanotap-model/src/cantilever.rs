@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::fmt;
+use std::sync::Arc;
 
 use serde::ser::SerializeMap as _;
 use serde::{Serialize, Serializer};
@@ -12,6 +13,7 @@ use crate::contact::entry::Damper;
 use crate::contact::law::Law;
 use crate::contact::{ContactLaw, MAX_ARMS};
 use crate::drive_form::{Actuation, FrequencyRatio, LARGEST, MAX_TONES, repetition};
+use crate::drive_signal::DriveSignal;
 use crate::lever_mode::LeverMode;
 use crate::parameter::{Applies, LARGEST_ALPHA, Numbers, OMEGA_RANGE, Parameter, Unit};
 use crate::sample_law::SampleLaw;
@@ -61,6 +63,8 @@ pub struct Cantilever {
     pub actuation: Actuation,
     /// Frequencies of further tones over Ω: of the second, and of a third.
     pub further_tones: Vec<FrequencyRatio>,
+    /// A piece of a signal of one shot in place of the tones; documents do not give it.
+    pub signal: Option<Arc<DriveSignal>>,
     /// Relaxing arms, each `[time, stiffness]` in units of √(mL⁴/(EI)) and EI/L³; empty for a
     /// contact law without a list of arms.
     pub arms: Vec<[f64; 2]>,
@@ -88,6 +92,7 @@ impl Cantilever {
             law: None,
             actuation: Actuation::Base,
             further_tones: Vec::new(),
+            signal: None,
             arms: Vec::new(),
             lever_modes: Vec::new(),
             further: Numbers::ZERO,
@@ -219,9 +224,12 @@ impl Cantilever {
     }
 
     /// Returns the period of the drive, in units of √(mL⁴/(EI)): 2π/Ω, or with several tones the
-    /// time after which all repeat; that of the first tone where they never repeat together.
+    /// time after which all repeat; that of the first tone where they never repeat together. Under a
+    /// piece of a signal it
+    /// is its length.
     pub fn period(&self) -> f64 {
-        f64::from(self.repetition()) * std::f64::consts::TAU / self.omega
+        let repetition = f64::from(self.repetition());
+        self.signal.as_ref().map_or(repetition, |of| of.length) * std::f64::consts::TAU / self.omega
     }
 
     /// Returns the case under its first tone alone.

@@ -16,6 +16,7 @@ use crate::drive_form::{Actuation, FrequencyRatio};
 use crate::measured_modes::Correction;
 use crate::parameter::Parameter;
 use nanotap_arithmetic::Scalar as _;
+use nanotap_flow::Complex;
 
 /// The two linear regimes of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -59,6 +60,8 @@ pub struct Gap {
     pub tip: DVector<f64>,
     /// Coefficient of sin Ωτ, in units of g₀.
     pub sine: f64,
+    /// Coefficient of cos Ωτ, in units of g₀: 0 but under a signal.
+    pub cosine: f64,
     /// Part constant in time, in units of g₀.
     pub constant: f64,
     /// Sine and cosine coefficients at the frequencies of further tones.
@@ -181,8 +184,9 @@ impl Forcing {
     /// Adds sine and cosine coefficients of a tone.
     fn add(&mut self, which: Which, [sine, cosine]: &[DVector<f64>; 2]) {
         let [own_sine, own_cosine] = match which {
-            Which::First => [&mut self.sine, &mut self.cosine],
+            Which::First | Which::OfSignal(0, ..) => [&mut self.sine, &mut self.cosine],
             Which::Further(k, _) => self.further[k].each_mut(),
+            Which::OfSignal(k, ..) => self.further[k - 1].each_mut(),
         };
         *own_sine += sine;
         *own_cosine += cosine;
@@ -208,11 +212,7 @@ impl Tone<Dual> {
     fn new(case: &Cantilever, dual: &impl Fn(Parameter) -> Dual, which: Which) -> Self {
         let zero = Dual::constant(0.0);
         let rate = which.rate(dual);
-        let (amplitude, phase) = match which {
-            Which::First => (dual(Parameter::Alpha2), zero),
-            Which::Further(k, _) => Parameter::TONES[k].map(dual).into(),
-        };
-        let (sin, cos) = phase.to_radians().sin_cos();
+        let (amplitude, [sin, cos]) = which.amplitude(dual);
         // s sin(wτ + θ) + c cos(wτ + θ)
         let turned = |s: Dual, c: Dual| [s * cos - c * sin, s * sin + c * cos];
         let (tip, spread, gap) = match case.actuation {
@@ -260,13 +260,44 @@ enum Which {
     First,
     /// Index among the further tones, and frequency over that of the first.
     Further(usize, FrequencyRatio),
+    /// Index among the tones of a signal, frequency over that of the drive, and z of `Re(z e^{iωt})`
+    /// over the amplitude of the drive.
+    OfSignal(usize, f64, Complex),
 }
 
 impl Which {
     /// All tones of a case.
-    fn all(case: &Cantilever) -> impl Iterator<Item = Self> {
+    fn all(case: &Cantilever) -> Vec<Self> {
+        if let Some(signal) = &case.signal {
+            let tones = signal.tones.iter().enumerate();
+            let tone =
+                |(k, (multiple, z)): (usize, &(f64, Complex))| Self::OfSignal(k, *multiple, *z);
+            return tones.map(tone).collect();
+        }
         let further = case.further_tones.iter().enumerate();
-        std::iter::once(Self::First).chain(further.map(|(k, ratio)| Self::Further(k, *ratio)))
+        std::iter::once(Self::First)
+            .chain(further.map(|(k, ratio)| Self::Further(k, *ratio)))
+            .collect()
+    }
+
+    /// The mean of a signal, as the cosine of a tone of frequency 0; 0 without a signal.
+    fn mean(case: &Cantilever) -> Self {
+        let mean = case.signal.as_ref().map_or(0.0, |signal| signal.mean);
+        Self::OfSignal(0, 0.0, Complex::new(mean, 0.0))
+    }
+
+    /// Amplitude, and sine and cosine of the phase.
+    fn amplitude(self, dual: &impl Fn(Parameter) -> Dual) -> (Dual, [Dual; 2]) {
+        let of_phase = |phase: Dual| <[Dual; 2]>::from(phase.to_radians().sin_cos());
+        match self {
+            Self::First => (dual(Parameter::Alpha2), of_phase(Dual::constant(0.0))),
+            Self::Further(k, _) => {
+                let [amplitude, phase] = Parameter::TONES[k].map(dual);
+                (amplitude, of_phase(phase))
+            }
+            // Re(z e^{iωt}) = Re z cos ωt − Im z sin ωt
+            Self::OfSignal(_, _, z) => (dual(Parameter::Alpha2), [z.re, -z.im].map(Dual::constant)),
+        }
     }
 
     /// Returns the angular frequency, in units of √(EI/(mL⁴)).
@@ -275,6 +306,7 @@ impl Which {
         match self {
             Self::First => omega,
             Self::Further(_, ratio) => omega * Dual::constant(ratio.value()),
+            Self::OfSignal(_, multiple, _) => omega * Dual::constant(multiple),
         }
     }
 }
@@ -290,6 +322,8 @@ struct Coefficients {
     beam_stiffness: f64,
     contact_stiffness: f64,
     tones: Vec<Tone<f64>>,
+    /// Mean of a signal, as the cosine of a tone of frequency 0.
+    mean: Tone<f64>,
     /// Whether the drive is spread over the beam.
     is_distributed: bool,
     /// Constant force that contact adds along p.
@@ -320,8 +354,10 @@ impl Coefficients {
             beam_stiffness: number(one),
             contact_stiffness: number(dual(Parameter::Alpha4)),
             tones: Which::all(case)
+                .into_iter()
                 .map(|which| Tone::new(case, &dual, which).map(number))
                 .collect(),
+            mean: Tone::new(case, &dual, Which::mean(case)).map(number),
             is_distributed: case.actuation == Actuation::Distributed,
             contact_constant: number(-(dual(Parameter::Alpha4) * dual(Parameter::Alpha5))),
             gap_tip: number(one),
@@ -355,10 +391,11 @@ impl Coefficients {
                 [0, 1].map(|k| p * (tone.tip[k] + touching * tone.contact[k]) + i * tone.spread[k])
             };
             let [sine, cosine] = tone(&self.tones[0]);
+            let [_, mean] = tone(&self.mean);
             Forcing {
                 sine,
                 cosine,
-                constant: p * (touching * self.contact_constant),
+                constant: p * (touching * self.contact_constant) + mean,
                 further: self.tones[1..].iter().map(tone).collect(),
             }
         };
@@ -376,7 +413,8 @@ impl Coefficients {
             gap: Gap {
                 tip: p * self.gap_tip,
                 sine: self.tones[0].gap[0],
-                constant: self.gap_constant,
+                cosine: self.tones[0].gap[1],
+                constant: self.gap_constant + self.mean.gap[1],
                 further: self.tones[1..].iter().map(|tone| tone.gap).collect(),
             },
         }

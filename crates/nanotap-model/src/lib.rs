@@ -21,6 +21,7 @@ mod beam_equations;
 pub mod cantilever;
 pub mod contact;
 pub mod drive_form;
+pub mod drive_signal;
 pub mod enclosed;
 pub mod exact_beam;
 mod fixed_point;
@@ -511,11 +512,18 @@ impl Model {
     }
 }
 
-/// The drive's tones: the first, and further ones if there are any.
+/// The drive's tones: the first, and further ones if there are any, or those of a signal.
 fn drive_of(case: &Cantilever) -> Result<Drive, FlowError> {
+    if let Some(signal) = &case.signal {
+        let tones = signal.tones.iter();
+        let frequencies: Vec<f64> = tones.map(|(multiple, _)| multiple * case.omega).collect();
+        return Drive::unlocked(case.period(), &frequencies);
+    }
     match case.further_tones[..] {
         [] => Drive::single(case.omega),
-        [ratio] if !ratio.repeats() => Drive::unlocked(case.omega, ratio.value() * case.omega),
+        [ratio] if !ratio.repeats() => {
+            Drive::unlocked(case.period(), &[case.omega, ratio.value() * case.omega])
+        }
         ref further => {
             let repetition = case.repetition();
             let harmonic = |of: &FrequencyRatio| repetition / of.denominator() * of.numerator();

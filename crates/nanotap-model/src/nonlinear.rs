@@ -103,13 +103,8 @@ impl Nonlinear {
             offset: height.constant,
             tones,
         };
-        // A repetition of two tones has several of the drive's periods.
-        let slowest = drive
-            .frequencies()
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
-        let repetitions = (drive.period() * slowest / TAU).max(1.0);
+        // A repetition of two tones, and the window of a signal, have several of the drive's periods.
+        let repetitions = (drive.period() * beam.drive_frequency() / TAU).max(1.0);
         let options = Options {
             max_steps: (MAX_STEPS * repetitions) as usize,
             ..Options::new(tolerance)

@@ -29,7 +29,8 @@ impl PartialEq for SampleLaw {
         self.values == other.values
             && self.rows == other.rows
             && self.arms == other.arms
-            && self.names().eq(other.names())
+            && self.terms.len() == other.terms.len()
+            && (self.entries().zip(other.entries())).all(|(a, b)| std::ptr::eq(a, b))
     }
 }
 
@@ -136,6 +137,8 @@ impl Serialize for SampleLaw {
         #[derive(Serialize)]
         struct Term<'a> {
             law: &'static str,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            force: Option<&'static str>,
             #[serde(flatten)]
             parameters: std::collections::BTreeMap<&'static str, f64>,
             #[serde(skip_serializing_if = "Option::is_none")]
@@ -156,6 +159,7 @@ impl Serialize for SampleLaw {
             let parameters = entry.parameters.iter().map(|p| p.name);
             terms.serialize_element(&Term {
                 law: entry.name,
+                force: law.text(),
                 parameters: parameters.zip(values.by_ref()).collect(),
                 rows: rows.map(Rows::points),
                 damping: rows.map(Rows::damping).filter(|all| !all.is_empty()),

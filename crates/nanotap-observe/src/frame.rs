@@ -312,9 +312,43 @@ pub struct Frame<'a> {
     units: Option<Units>,
     shown: Cow<'static, str>,
     align: [Align; 2],
+    /// Whether readers see each column as a line, whose head is that of the column.
+    is_turned: bool,
 }
 
 impl<'a> Frame<'a> {
+    /// The heads, each with its meaning and the alignment below it, and the cells of these rows, as
+    /// readers are shown them.
+    pub fn shown(&self, rows: impl IntoIterator<Item = usize>) -> Shown {
+        let rows: Vec<usize> = rows.into_iter().collect();
+        let columns = self.shown_columns();
+        let texts = |c: &Column<'_>| rows.iter().map(|row| self.text(c, *row)).collect();
+        match &columns[..] {
+            [names, values @ ..] if self.is_turned => {
+                let names: Vec<String> = texts(names);
+                let heads = std::iter::once(self.head(columns[0])).chain(names);
+                let line = |c: &&Column<'_>| {
+                    let cells: Vec<String> = texts(c);
+                    std::iter::once(self.head(c)).chain(cells).collect()
+                };
+                Shown {
+                    heads: heads
+                        .map(|head| (head, String::new(), Align::Left))
+                        .collect(),
+                    rows: values.iter().map(line).collect(),
+                }
+            }
+            _ => Shown {
+                heads: (columns.iter())
+                    .map(|c| (self.head(c), c.label.to_string(), self.align(c)))
+                    .collect(),
+                rows: (rows.iter())
+                    .map(|row| columns.iter().map(|c| self.text(c, *row)).collect())
+                    .collect(),
+            },
+        }
+    }
+
     /// The columns that readers are shown.
     pub fn shown_columns(&self) -> Vec<&Column<'a>> {
         if self.shown.is_empty() {
@@ -423,6 +457,15 @@ impl<'a> Frame<'a> {
     }
 }
 
+/// A frame as readers are shown it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Heads, with their meanings and the alignment below them.
+    pub heads: Vec<(String, String, Align)>,
+    /// The cells of each line.
+    pub rows: Vec<Vec<String>>,
+}
+
 /// A frame that is being made from rows of one type.
 pub struct Rows<'a, R> {
     rows: Rc<[R]>,
@@ -445,6 +488,7 @@ impl<'a, R: Clone + 'a> Rows<'a, R> {
             units,
             shown: "".into(),
             align: [Align::Right, Align::Point],
+            is_turned: false,
         };
         Self { rows, frame }
     }
@@ -529,6 +573,14 @@ impl<'a, R: Clone + 'a> Rows<'a, R> {
     #[must_use]
     pub fn aligned(mut self, quantities: Align, numbers: Align) -> Self {
         self.frame.align = [quantities, numbers];
+        self
+    }
+
+    /// Shows readers a line for each column but the first, which names what stands in the columns then:
+    /// for few rows of many quantities.
+    #[must_use]
+    pub fn turned(mut self) -> Self {
+        self.frame.is_turned = true;
         self
     }
 

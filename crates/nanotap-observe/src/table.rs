@@ -204,6 +204,18 @@ macro_rules! observables {
             pub const FIRST_HARMONIC: Self =
                 Self(1 << Row::first_harmonic as usize | 1 << Row::phase as usize);
 
+            /// Extremes and the time in contact: what a motion has that does not repeat.
+            pub const EXTREMES: Self = Self(
+                1 << Row::tip_max as usize
+                    | 1 << Row::tip_min as usize
+                    | 1 << Row::indentation as usize
+                    | 1 << Row::contact_fraction as usize
+                    | 1 << Row::peak_force as usize
+                    | 1 << Row::least_force as usize
+                    | 1 << Row::impact_speed as usize
+                    | 1 << Row::gap_range as usize,
+            );
+
             /// Minimum and maximum of the gap.
             pub(super) const GAP: Self = Self(1 << Row::gap_range as usize);
 

@@ -5,6 +5,7 @@ use nanotap_flow::Output;
 use nanotap_case::Case;
 use nanotap_case::quantity::Kind;
 use nanotap_case::units::Units;
+use nanotap_model::recording::Recording;
 use nanotap_model::{Model, MotionError};
 
 /// Largest number of rows of a time series: they take some gigabytes.
@@ -73,6 +74,30 @@ pub fn with_modes(state: &[f64], memory: usize, modes: usize) -> Vec<f64> {
     [fitted(displacements), fitted(velocities), sample.to_vec()].concat()
 }
 
+/// The row of a recording that began a time `before` after that of the series, at a time from the
+/// recording's beginning; `None` for an empty recording. `tip_rate` is [`Model::tip_rate`].
+pub fn row_at(
+    model: &Model,
+    tip_rate: &Output,
+    recording: &Recording,
+    [time, before]: [f64; 2],
+) -> Option<Vec<f64>> {
+    let instant = recording.instant(time)?;
+    let at = |output: &Output| output.at(model.system.drive(), &instant.state, time);
+    let contact = model.touches(instant.regime);
+    let mut numbers = vec![
+        before + time,
+        at(&model.tip),
+        at(tip_rate),
+        at(&model.height),
+        model.force_at(&instant),
+        f64::from(u8::from(contact)),
+    ];
+    numbers.extend_from_slice(&instant.state);
+    model.set_surface(&mut numbers[COLUMNS.len()..], contact, at(&model.height));
+    Some(numbers)
+}
+
 /// Calls `row` for `resolution` equidistant instants in each of `periods` drive periods from the
 /// state `start` at drive phase 0, and for the end. The memory needed is that of one period.
 ///
@@ -99,22 +124,10 @@ pub fn sample(
         let last = usize::from(period + 1 == periods);
         for k in 0..resolution + last {
             let phase = model.period() * k as f64 / resolution as f64;
-            let Some(instant) = recording.instant(phase) else {
-                continue;
-            };
-            let at = |output: &Output| output.at(model.system.drive(), &instant.state, phase);
-            let contact = model.touches(instant.regime);
-            let mut numbers = vec![
-                period as f64 * model.period() + phase,
-                at(&model.tip),
-                at(&tip_rate),
-                at(&model.height),
-                model.force_at(&instant),
-                f64::from(u8::from(contact)),
-            ];
-            numbers.extend_from_slice(&instant.state);
-            model.set_surface(&mut numbers[COLUMNS.len()..], contact, at(&model.height));
-            row(&numbers);
+            let before = period as f64 * model.period();
+            if let Some(numbers) = row_at(model, &tip_rate, &recording, [phase, before]) {
+                row(&numbers);
+            }
         }
     }
     Ok(())

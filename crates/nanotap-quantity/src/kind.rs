@@ -1,6 +1,8 @@
 //! The table of kinds of quantities: name, dimension, units, words.
 
+use std::collections::HashMap;
 use std::fmt;
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use serde::{Serialize, Serializer};
 
@@ -144,10 +146,54 @@ kinds! {
     Place "place": Dimension::NONE, "1" Bare, "a place on the beam", "0.5", "L";
 }
 
+/// Largest number of kinds that are not in the table; each dimension needs one, for as long as the program
+/// runs.
+const MAX_KINDS: usize = 1000;
+
 impl Kind {
     /// Creates a kind that is not in the table.
     pub const fn new(entry: &'static KindEntry) -> Self {
         Self(entry)
+    }
+
+    /// Returns the kind of quantities of a dimension: the first of [`Kind::ALL`] that has it, or one with
+    /// its base units. `None` for a new one after a thousand others.
+    ///
+    /// ```
+    /// use nanotap_quantity::{Dimension, Kind};
+    ///
+    /// let kind = Kind::of(Dimension::new(1, -2, -2)).unwrap();
+    /// assert_eq!(kind.si_unit(), "kg m^-2 s^-2");
+    /// assert_eq!(kind.parse("1 GN/m^3"), Ok(1e9));
+    /// assert_eq!(Kind::of(Dimension::new(1, 1, -2)), Some(Kind::Force));
+    /// ```
+    pub fn of(dimension: Dimension) -> Option<Self> {
+        static OTHERS: LazyLock<Mutex<HashMap<Dimension, Kind>>> = LazyLock::new(Mutex::default);
+        if let Some(kind) = dimension.kind() {
+            return Some(kind);
+        }
+        let mut others = OTHERS.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = others.len();
+        if let Some(kind) = others.get(&dimension) {
+            return Some(*kind);
+        }
+        if count == MAX_KINDS {
+            return None;
+        }
+        // Kept for as long as the program runs, once a dimension.
+        let kept = |text: String| -> &'static str { text.leak() };
+        let unit = kept(dimension.to_string());
+        let kind = Self(Box::leak(Box::new(KindEntry {
+            name: kept(unit.replace([' ', '^'], "_")),
+            dimension,
+            si_unit: unit,
+            display: Display::Unit,
+            noun: kept(format!("a quantity in {unit}")),
+            example: kept(format!("1 {unit}")),
+            model_unit: None,
+        })));
+        others.insert(dimension, kind);
+        Some(kind)
     }
 
     /// Returns the kind whose SI unit this is; `None` for a pure number and for any other unit.

@@ -115,19 +115,22 @@ pub struct TargetMotion {
 }
 
 impl TargetMotion {
-    fn value(&self, observable: &Observable) -> f64 {
+    /// Value of an observable of [`ObservableSet::COMMON`], in the unit of its dataset; NaN where
+    /// unknown.
+    pub fn value(&self, observable: &Observable) -> f64 {
         let index = ObservableSet::COMMON.iter().position(|o| o == observable);
         index
             .and_then(|k| self.values.get(k).copied())
             .unwrap_or(f64::NAN)
     }
 
-    fn named(&self, name: &str) -> f64 {
+    /// Value of the observable with this name, as [`value`](Self::value).
+    pub fn named(&self, name: &str) -> f64 {
         Observable::named(name).map_or(f64::NAN, |observable| self.value(observable))
     }
 
     /// Its regime; `None` if its mean force is unknown.
-    fn regime(&self) -> Option<Regime> {
+    pub fn regime(&self) -> Option<Regime> {
         if self.period == 0 {
             return Some(Regime::Irregular);
         }
@@ -153,15 +156,15 @@ pub struct TargetPoint {
 }
 
 impl TargetPoint {
-    /// Returns the number of different motions found at the point.
-    fn states(&self) -> usize {
+    /// Returns the different motions found at the point, each once.
+    pub fn different(&self) -> Vec<&TargetMotion> {
         let mut different: Vec<&TargetMotion> = Vec::new();
         for motion in &self.motions {
             if !different.iter().any(|other| other.is_same(motion)) {
                 different.push(motion);
             }
         }
-        different.len()
+        different
     }
 
     /// Returns whether all conditions hold; false where no motion or an unclassified one was found.
@@ -302,7 +305,9 @@ impl Target {
     fn holds(&self, point: &TargetPoint) -> bool {
         let each = |holds: &dyn Fn(&TargetMotion) -> bool| point.motions.iter().all(holds);
         match &self.condition {
-            Condition::States(comparison, count) => comparison.holds(point.states() as f64, *count),
+            Condition::States(comparison, count) => {
+                comparison.holds(point.different().len() as f64, *count)
+            }
             Condition::Period(comparison, period) => {
                 each(&|m| m.period > 0 && comparison.holds(m.period as f64, *period))
             }

@@ -8,7 +8,7 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use nanotap_volterra::{Coarse, Flow};
+use nanotap_volterra::{Coarse, Flow, ForceLaw, laws};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -17,7 +17,26 @@ fn main() {
 }
 
 fn flow(modes: usize, nodes: usize) -> (Flow, Vec<f64>) {
-    let system = common::beam(common::dmt(), modes, 0.9, 200.0, 20.0, 18.0, nodes);
+    flow_under(common::dmt(), modes, nodes)
+}
+
+/// DMT contact as a formula of a case.
+fn written() -> Arc<dyn ForceLaw> {
+    let text = "4/3*E*sqrt(R)*max(a0 - d, 0)^1.5/(1 - nu^2) - H*R/(6*max(d, a0)^2)";
+    let law = laws::written::law(text, &[]).unwrap();
+    let value = |name: &str| match name {
+        "modulus" => 1.0,
+        "poisson" => 0.3,
+        "radius" => 5.0,
+        "hamaker" => 0.03,
+        _ => 0.169,
+    };
+    let values: Vec<f64> = law.entry.parameters.iter().map(|p| value(p.name)).collect();
+    law.with(&values).unwrap()
+}
+
+fn flow_under(law: Arc<dyn ForceLaw>, modes: usize, nodes: usize) -> (Flow, Vec<f64>) {
+    let system = common::beam(law, modes, 0.9, 200.0, 20.0, 18.0, nodes);
     let mut flow = Flow::new(Arc::new(system));
     // Near the repulsive orbit, after a transient.
     let mut state = vec![0.0; 2 * modes];
@@ -51,6 +70,23 @@ fn dmt_period(bencher: divan::Bencher, modes: usize) {
         per(after.evaluations, before.evaluations),
         per(after.factorisations, before.factorisations),
     );
+}
+
+#[divan::bench(args = [1, 3, 10])]
+fn formula_period(bencher: divan::Bencher, modes: usize) {
+    let (mut flow, mut state) = flow_under(written(), modes, 20);
+    bencher.bench_local(|| {
+        flow.start(&state, 0.0).unwrap();
+        flow.run_until(TAU).unwrap();
+        flow.state(&mut state);
+    });
+}
+
+#[divan::bench(args = [1, 3, 10])]
+fn coarse_formula_period(bencher: divan::Bencher, modes: usize) {
+    let (flow, mut state) = flow_under(written(), modes, 20);
+    let mut coarse = Coarse::new(flow.system(), TAU).unwrap();
+    bencher.bench_local(|| coarse.run_periods(&mut state, None, 1).unwrap());
 }
 
 #[divan::bench(args = [1, 3, 5, 10, 20])]

@@ -50,7 +50,76 @@ pub struct AveragedMotion {
     pub amplitude: f64,
 }
 
+/// Averages of the force over one oscillation of the gap, `d̄ + A cos θ`, in the system's units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AveragedForce {
+    /// Mean force.
+    pub mean: f64,
+    /// Complex first harmonic: `F ≈ F̄ + Re f e^{iθ}`.
+    pub first: Complex,
+    /// Largest force, at least 0.
+    pub peak: f64,
+    /// Time on branches on which tip and sample touch, as a fraction of the oscillation.
+    pub contact: f64,
+}
+
+/// A system whose gap oscillates with the frequency of its strongest tone, with a slow amplitude.
+#[derive(Clone, Debug)]
+pub struct SlowGap<'a>(Averaging<'a>);
+
+impl<'a> SlowGap<'a> {
+    /// Returns `None` for a system without a drive that moves the gap, with a mode that has no
+    /// response, with a surface that relaxes, or with a force that depends on time.
+    pub fn new(system: &'a System) -> Option<Self> {
+        Averaging::new(system).map(Self)
+    }
+
+    /// Returns the complex amplitude of the gap without the force.
+    pub const fn drive(&self) -> Complex {
+        self.0.drive
+    }
+
+    /// Returns the gap at rest without the force.
+    pub const fn rest(&self) -> f64 {
+        self.0.system.gap_constant
+    }
+
+    /// Returns the static change of the gap by a unit force.
+    pub const fn compliance(&self) -> f64 {
+        self.0.compliance
+    }
+
+    /// Returns the complex amplitude of the gap under a force of amplitude 1 at the frequency.
+    pub const fn receptance(&self) -> Complex {
+        self.0.receptance
+    }
+
+    /// Returns the gap at and behind which the law does not hold; −∞ if it has no pole.
+    pub const fn pole(&self) -> f64 {
+        self.0.pole
+    }
+
+    /// Averages the force over an oscillation that begins at the far turning point.
+    pub fn force(&self, mean: f64, amplitude: f64) -> AveragedForce {
+        let law = self.0.system.law();
+        let mut out = AveragedForce::default();
+        self.0.oscillate(mean, amplitude, |phase, force, branch| {
+            let part = phase.weight * force;
+            out.mean += part;
+            out.first += Complex::new(2.0 * part * phase.cos, -2.0 * part * phase.sin);
+            out.peak = out.peak.max(force);
+            out.contact += if law.touches(branch) {
+                phase.weight
+            } else {
+                0.0
+            };
+        });
+        out
+    }
+}
+
 /// The linear response of a system to the strongest tone and to a force, as averaging uses it.
+#[derive(Clone, Debug)]
 struct Averaging<'a> {
     system: &'a System,
     frequency: f64,

@@ -77,6 +77,9 @@ pub enum VolterraError {
     /// The approximate flow does not support a surface that relaxes.
     #[error("the approximate flow does not follow a surface that relaxes")]
     Relaxing,
+    /// A force that is written as a formula is wrong.
+    #[error("{0}")]
+    Formula(#[from] nanotap_formula::FormulaError),
     /// Invalid Maxwell arms.
     #[error("arm {arm} of the relaxing sample: {reason}")]
     Arms {

@@ -193,7 +193,8 @@ pub trait ForceLaw: Debug + Send + Sync {
     /// switch, to `out`.
     fn guard_by_parameters(&self, branch: usize, exit: usize, gap: f64, rate: f64, out: &mut [f64]);
 
-    /// Returns the energy stored at this gap, zero far away; `None` for a law without a potential.
+    /// Returns the energy stored at this gap, up to a constant of the law; `None` for a law without a
+    /// potential. The energy is zero far away, or, of a formula, at a gap of the law's own.
     fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
         let _ = (branch, gap);
         None

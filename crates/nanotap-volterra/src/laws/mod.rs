@@ -17,6 +17,7 @@ pub mod jkr;
 pub mod kelvin_voigt;
 pub mod layer;
 pub mod lennard_jones;
+pub mod pair;
 pub mod prony;
 pub mod solvation;
 pub mod spring_damper;
@@ -25,13 +26,15 @@ pub mod table;
 pub mod thin;
 pub mod van_der_waals;
 pub mod viscous;
+pub mod written;
 
 use crate::error::VolterraError;
 use crate::law::{Exit, ForceLaw, Guard};
 use elastic::Shape;
 use entry::{Entry, Part};
 use formula::{Formula, Law};
-use std::sync::Arc;
+use nanotap_formula::FormulaError;
+use std::sync::{Arc, LazyLock};
 
 /// Largest number of laws in a sum.
 pub const MAX_TERMS: usize = 8;
@@ -53,7 +56,16 @@ enum Make {
     Rows,
     /// Parameters and the arms of a Prony series.
     Arms(Shape),
+    /// Parameters and a formula, which tells them.
+    Text,
+    /// Parameters of this formula, which a case states.
+    Written(&'static written::Writing),
+    /// Parameters of this formula, which the table states.
+    Listed(&'static Listed),
 }
+
+/// The formula of a law of the table, read when it is first needed.
+type Listed = LazyLock<Result<written::Writing, FormulaError>>;
 
 impl TableLaw {
     /// Builds the law with these parameters, in the order of its entry.
@@ -73,12 +85,36 @@ impl TableLaw {
                 arm: 1,
                 reason: "a relaxing sample needs at least one arm",
             }),
+            Make::Text => Err(FormulaError {
+                text: String::new(),
+                place: 0..0,
+                reason: "the formula of the force is missing".into(),
+            }
+            .into()),
+            Make::Written(writing) => writing.law(parameters),
+            Make::Listed(listed) => match &**listed {
+                Ok(writing) => writing.law(parameters),
+                Err(error) => Err(error.clone().into()),
+            },
         }
     }
 
     /// Reports whether it is a table of gap and force.
     pub const fn has_rows(&self) -> bool {
         matches!(self.make, Make::Rows)
+    }
+
+    /// Reports whether it needs a formula ([`written::law`]).
+    pub const fn needs_formula(&self) -> bool {
+        matches!(self.make, Make::Text)
+    }
+
+    /// Returns the formula, if it is one.
+    pub const fn text(&self) -> Option<&'static str> {
+        match self.make {
+            Make::Written(writing) => Some(writing.text()),
+            _ => None,
+        }
     }
 
     fn check(&self, parameters: &[f64]) -> Result<(), VolterraError> {
@@ -120,8 +156,8 @@ const fn voigt(shape: Shape, pulls: bool) -> kelvin_voigt::KelvinVoigt {
     kelvin_voigt::KelvinVoigt { shape, pulls }
 }
 
-/// Every law given by parameters alone ([`table::TABLE`] has rows in addition,
-/// [`prony::TABLE`] arms).
+/// Every law in Rust that is given by parameters alone ([`pair::TABLE`] has formulas, [`table::TABLE`] rows
+/// in addition, [`prony::TABLE`] arms).
 pub static TABLE: &[TableLaw] = table! {
     elastic::HERTZ => elastic::Elastic(Shape::Sphere),
     elastic::CONE => elastic::Elastic(Shape::Cone),
@@ -156,9 +192,12 @@ pub static TABLE: &[TableLaw] = table! {
     spring_damper::SPRING_DAMPER => spring_damper::SpringDamper,
 };
 
-/// Returns every law: those of [`TABLE`], those with Maxwell arms, and the table of rows.
+/// Returns every law: those of [`TABLE`], formulas of the table, those with Maxwell arms, the table of
+/// rows, and the formula of a case.
 pub fn all() -> impl Iterator<Item = &'static TableLaw> {
-    TABLE.iter().chain(&prony::TABLE).chain([&table::TABLE])
+    let others = [&table::TABLE, &written::FORMULA];
+    let listed = TABLE.iter().chain(&pair::TABLE).chain(&prony::TABLE);
+    listed.chain(others)
 }
 
 /// Returns the law of a name.

@@ -8,8 +8,8 @@ use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use crate::Case;
+use crate::physical::Physical;
 use crate::physical::force::SampleForce;
-use crate::physical::{MappingRow, Physical};
 use nanotap_model::cantilever::Cantilever;
 use nanotap_model::nonlinear::Equilibrium;
 use nanotap_model::oscillator::{Oscillator, OscillatorParameter, Stop};
@@ -402,34 +402,4 @@ pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
     }
     let model = case.model();
     model.map_or_else(|_| Vec::new(), |model| model.equilibria())
-}
-
-/// A dimensionless parameter with its physical quantity, as a document.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct MappingDocument {
-    /// Name of the dimensionless parameter.
-    pub parameter: &'static str,
-    /// Value of the parameter, dimensionless.
-    pub value: f64,
-    /// Formula of the parameter, such as `M/(mL)`.
-    pub formula: &'static str,
-    /// Name of the physical quantity.
-    pub quantity: &'static str,
-    /// Value of the physical quantity in the SI unit `unit`.
-    pub si: f64,
-    /// SI unit of `si`.
-    pub unit: &'static str,
-}
-
-impl From<MappingRow> for MappingDocument {
-    fn from(row: MappingRow) -> Self {
-        Self {
-            parameter: row.parameter.name(),
-            value: row.value,
-            formula: row.formula,
-            quantity: row.quantity,
-            si: row.si,
-            unit: row.kind.si_unit(),
-        }
-    }
 }

@@ -5,7 +5,6 @@
 //! 0]]`, or the name of a CSV file with these columns. Such a file is read relative to the case
 //! file, once; the case then contains the array.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use nanotap_volterra::laws::curve::Interpolation;
@@ -17,7 +16,6 @@ use super::key::Takes;
 use super::lever_modes::{self, LeverModes};
 use super::quantity::Kind;
 use super::stated::Value;
-use crate::input::Origin;
 use crate::table::{Entry, Header, Table};
 use nanotap_error::Error;
 
@@ -328,14 +326,6 @@ impl Takes {
             Self::ModelLeverModes => Value::LeverModes(LeverModes::of(table, false)?),
             _ => Value::Table(ForceTable::of(table)?),
         })
-    }
-
-    /// The value of a key that takes a table, from a CSV file.
-    ///
-    /// # Errors
-    /// If it cannot be read or is not such a table, with the place.
-    pub(crate) fn read_table(self, path: &Path, origin: Origin) -> Result<Value, ForceTableError> {
-        self.of_table(&Table::read_from(path, origin, None)?)
     }
 
     /// The value of a key that takes a table, from the text of an array or of a CSV file.

@@ -118,7 +118,15 @@ pub fn read(path: &Path, limit: u64, origin: Origin) -> Result<Vec<u8>, InputErr
 /// # Errors
 /// As [`read`], or if it is not text.
 pub fn text(path: &Path, limit: u64, origin: Origin) -> Result<String, InputError> {
-    String::from_utf8(read(path, limit, origin)?).map_err(|error| {
+    decoded(path, read(path, limit, origin)?)
+}
+
+/// The text of a file whose bytes were read.
+///
+/// # Errors
+/// If it is not text in UTF-8.
+pub fn decoded(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+    String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         failed(path)(InputFault::NotText(offset))
     })

@@ -30,6 +30,7 @@ mod error;
 mod family;
 pub mod file;
 pub mod force_table;
+mod included;
 pub mod input;
 pub mod key;
 pub mod lever_modes;
@@ -74,6 +75,7 @@ use units::Units;
 
 use nanotap_model::cantilever::Cantilever;
 use nanotap_model::drive_form::FrequencyRatio;
+use nanotap_model::drive_signal::DriveSignal;
 use nanotap_model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap_model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use nanotap_quantity::number::shortest;
@@ -282,18 +284,35 @@ impl Case {
         }
     }
 
-    /// The path of a file that `[scan]` names, relative to the case file.
+    /// The name and the content, of at most `most` bytes, of a file that `[scan]` names: relative to the
+    /// case file, or included in the case.
     ///
     /// # Errors
-    /// When the case was not read from a file: nothing is then read from disk.
-    pub fn relative_file(&self, name: &str) -> Result<std::path::PathBuf, nanotap_error::Error> {
-        let folder = self.folder.as_ref().ok_or_else(|| {
+    /// When it cannot be read, or the case was not read from a file: nothing is then read from disk.
+    pub fn file(&self, name: &str, most: u64) -> Result<(String, Vec<u8>), nanotap_error::Error> {
+        if included::is_address(name) {
+            let (name, bytes) = included::content(name).ok_or_else(|| {
+                nanotap_error::Error::input(
+                    "a file that is included in the case is damaged",
+                    "name the file",
+                )
+            })?;
+            return Ok((name.to_owned(), bytes));
+        }
+        let path = self.relative_file(name).ok_or_else(|| {
             nanotap_error::Error::input(
                 format!("{name}: a case that was not read from a file cannot name other files"),
                 "load the case from a file",
             )
         })?;
-        Ok(folder.join(name))
+        let bytes = input::read(&path, most, input::Origin::File)?;
+        Ok((path.display().to_string(), bytes))
+    }
+
+    /// The path of a file that `[scan]` names, if it is one on disk.
+    fn relative_file(&self, name: &str) -> Option<std::path::PathBuf> {
+        let folder = self.folder.as_ref()?;
+        (!included::is_address(name)).then(|| folder.join(name))
     }
 
     /// The same case with `key=value` words that replace what it states.
@@ -407,6 +426,15 @@ impl Case {
         }
     }
 
+    /// Returns the keys of the parameters of a stated formula.
+    pub fn formula_keys(&self) -> Vec<Key> {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return Vec::new();
+        };
+        let keys = quantities.stated.iter().map(|(key, _)| key);
+        keys.filter(|key| key.is_of_formula()).collect()
+    }
+
     /// The key called `name` (with or without `model.`) that can vary: a number of the equations,
     /// or a quantity of a physical case.
     ///
@@ -421,7 +449,8 @@ impl Case {
             return Ok(key);
         }
         if self.is_physical() && name.contains('.') && plain == name {
-            return match Key::find(name) {
+            let mut of_formula = self.formula_keys().into_iter();
+            return match Key::find(name).or_else(|| of_formula.find(|key| key.path() == name)) {
                 Some(key) => key
                     .cannot_vary()
                     .map_or(Ok(key), |reason| Err(NoSuchKey::Fixed { key, reason })),
@@ -806,6 +835,20 @@ impl Case {
         let [frequency_key, strength_key] = self.drive_keys();
         self.with(frequency_key, frequency)
             .with(strength_key, strength)
+    }
+
+    /// The same case under a signal of one shot in place of its periodic drive, at its distance;
+    /// `None` for an oscillator.
+    pub fn under_signal(&self, signal: &Arc<DriveSignal>) -> Option<Self> {
+        let mut driven = self.clone();
+        let cantilever = match &mut driven.what {
+            CaseKind::Cantilever(cantilever) => cantilever,
+            CaseKind::Quantities(quantities) => &mut quantities.view.as_mut().ok()?.cantilever,
+            CaseKind::Oscillator(_) => return None,
+        };
+        cantilever.further_tones.clear();
+        cantilever.signal = Some(Arc::clone(signal));
+        Some(driven)
     }
 
     /// Keys of the frequency and strength of the drive in the model's units.

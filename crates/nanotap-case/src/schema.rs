@@ -13,10 +13,20 @@ use super::key::{Default, Entry, Key, Section, Takes};
 /// `x-instead-of`, the keys that state the same quantity and cannot be given with it.
 pub fn schema() -> Schema {
     let tables = Section::ALL.into_iter().map(|section| {
-        let keys: Map<_, _> = section
-            .keys()
+        let keys = section.keys();
+        let mut keys: Map<_, _> = keys
             .map(|key| (key.name().to_owned(), described(key)))
             .collect();
+        if section == Section::Sample {
+            let parameters = json!({
+                "type": "object",
+                "description": "parameters of the formula sample.force, by name",
+                "examples": [{"E": "2 GPa", "n": 1.5}],
+                "propertyNames": {"pattern": "^[\\p{L}_][\\p{L}\\p{N}_]*$"},
+                "additionalProperties": {"type": ["string", "number"]},
+            });
+            keys.insert("parameters".to_owned(), parameters);
+        }
         let table = json!({
             "type": "object",
             "properties": keys,
@@ -96,6 +106,11 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
         }
         Takes::LeverName | Takes::MaterialName => {
             say("type", "string".into());
+            return schema;
+        }
+        Takes::Formula => {
+            say("type", "string".into());
+            say("examples", json!(["k*max(-d, 0) - c*v"]));
             return schema;
         }
         Takes::State => {

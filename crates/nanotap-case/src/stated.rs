@@ -22,7 +22,7 @@ pub enum Value {
     Number(f64, Kind),
     /// One of the key's words.
     Word(&'static str),
-    /// A name of the catalogue, or the names of nonlinear laws.
+    /// A name of the catalogue, the names of nonlinear laws, or a formula.
     Name(Arc<str>),
     /// A ratio of two frequencies of the drive.
     Ratio(FrequencyRatio),
@@ -137,7 +137,7 @@ impl Key {
                 })?)
             }
             Takes::Law => law(text)?,
-            Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
+            Takes::LeverName | Takes::MaterialName | Takes::Formula => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
             Takes::State => Value::State(WrittenState::parse(text)?),
             takes @ (Takes::Table

@@ -2,7 +2,7 @@
 
 use super::key::{Key, Takes};
 use super::physical::drive::{FURTHER, ToneKeys};
-use super::physical::force::{keys_of_contacts, linear_takes, takes};
+use super::physical::force::{keys_of_contact, keys_of_contacts, linear_takes, takes, terms_with};
 use super::quantity::Kind;
 use super::stated::{Stated, Value};
 use super::{Case, CaseKind};
@@ -10,11 +10,21 @@ use nanotap_error::Error;
 use nanotap_model::cantilever::Cantilever;
 use nanotap_model::contact::ContactLaw;
 use nanotap_model::parameter::{Applies, Parameter};
-use nanotap_model::sample_law::SampleLaw;
+use nanotap_volterra::laws::TableLaw;
 
 /// A contact law by its name: a linear contact, or nonlinear forces joined by `+`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LawName(Value);
+#[derive(Clone, Debug)]
+pub struct LawName {
+    name: Value,
+    /// The nonlinear laws; none for a linear contact.
+    terms: Vec<&'static TableLaw>,
+}
+
+impl PartialEq for LawName {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
 
 impl LawName {
     /// The law that a text names.
@@ -24,30 +34,39 @@ impl LawName {
     pub fn read(text: &str) -> Result<Self, Error> {
         let read = Key::SampleLaw.read(text);
         let law = read.map_err(|error| Error::input(error.to_string(), "name one of them"))?;
-        Ok(Self(law))
+        Ok(Self::with(law, &Stated::default()))
+    }
+
+    /// The law of this name, with the formula that is stated if it is one.
+    fn with(name: Value, stated: &Stated) -> Self {
+        let terms = match &name {
+            Value::Name(names) => terms_with(stated, names).unwrap_or_default(),
+            _ => Vec::new(),
+        };
+        Self { name, terms }
     }
 
     /// The law of a case; the first linear one if it names none.
     fn of(stated: &Stated) -> Self {
         let linear = || Value::Word(ContactLaw::ALL[0].name());
-        Self(stated.get(Key::SampleLaw).cloned().unwrap_or_else(linear))
+        let name = stated.get(Key::SampleLaw).cloned();
+        Self::with(name.unwrap_or_else(linear), stated)
     }
 
     /// The name of the law, as in a case file.
     pub fn text(&self) -> String {
-        self.0.text()
+        self.name.text()
     }
 
     /// True if a key can be stated with this law.
     pub fn takes(&self, key: Key) -> bool {
-        if !keys_of_contacts().any(|of_some| of_some == key) {
+        if !key.is_of_formula() && !keys_of_contacts().any(|of_some| of_some == key) {
             return true;
         }
-        let name = self.0.text();
-        if let Ok(law) = name.parse::<ContactLaw>() {
-            return linear_takes(law, key);
+        match &self.name {
+            Value::Word(word) => word.parse().is_ok_and(|law| linear_takes(law, key)),
+            _ => takes(&self.terms, key),
         }
-        SampleLaw::terms(&name).is_ok_and(|terms| takes(&terms, key))
     }
 }
 
@@ -65,6 +84,9 @@ pub struct LawChange {
 /// Usual force curve of a stiff sample with attraction: gap in nm, force in nN.
 const CURVE: &str = "[[\"gap (nm)\", \"force (nN)\"], [-1, 20], [-0.5, 5], [0, -1.5], \
      [0.5, -0.6], [1, -0.3], [2, -0.1], [5, -0.02], [10, 0]]";
+
+/// Usual formula: Hertz's, with the quantities that tip and sample have.
+const FORMULA: &str = "4/3*E/(1 - nu^2)*sqrt(R)*max(-d, 0)^1.5";
 
 /// Usual arms of a polymer: three, with times comparable to the period of tapping.
 const ARMS: &str = "[[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136], [7.2, 67]]";
@@ -94,11 +116,27 @@ impl Case {
         };
         let name = LawName::read(law)?;
         let mut quantities = quantities.clone();
+        // A formula tells what it takes: the stated one, that of `like`, or the usual one.
+        let mut written = quantities.stated.clone();
+        if name.takes(Key::SampleForce) && !written.has(Key::SampleForce) {
+            let usual = usual(Key::SampleForce, like);
+            let values = like.formula_keys().into_iter();
+            let values = values.filter_map(|key| Some((key, like.stated(key)?.clone())));
+            for (key, value) in usual
+                .map(|text| (Key::SampleForce, text))
+                .into_iter()
+                .chain(values)
+            {
+                written.put(key, value);
+            }
+        }
+        let name = LawName::with(name.name, &written);
         let stated = &mut quantities.stated;
         // What `like` states returns as soon as a law takes it again.
         let present = LawName::of(stated);
         let returns = |key: &Key| name.takes(*key) && !present.takes(*key);
-        let mut added: Vec<(Key, Value)> = keys_of_contacts()
+        let of_like = keys_of_contacts().chain(like.formula_keys());
+        let mut added: Vec<(Key, Value)> = of_like
             .filter(returns)
             .filter_map(|key| Some((key, like.stated(key)?.clone())))
             .collect();
@@ -107,11 +145,11 @@ impl Case {
                 .any(|(other, _)| added.iter().any(|(k, _)| *k == other))
         };
         let foreign = |key: &Key| stated.has(*key) && (!name.takes(*key) || replaced(*key));
-        let dropped: Vec<Key> = keys_of_contacts().filter(foreign).collect();
+        let dropped: Vec<Key> = keys_of_contact(stated).filter(foreign).collect();
         for key in &dropped {
             stated.remove(*key);
         }
-        stated.put(Key::SampleLaw, name.0.clone());
+        stated.put(Key::SampleLaw, name.name.clone());
         for (key, value) in &added {
             stated.put(*key, value.clone());
         }
@@ -169,10 +207,13 @@ impl Case {
         };
         let mut quantities = quantities.clone();
         let stated = &mut quantities.stated;
-        for key in keys_of_contacts().filter(|key| !law.takes(*key)) {
+        let foreign: Vec<Key> = keys_of_contact(stated)
+            .filter(|key| !law.takes(*key))
+            .collect();
+        for key in foreign {
             stated.remove(key);
         }
-        stated.put(Key::SampleLaw, law.0.clone());
+        stated.put(Key::SampleLaw, law.name.clone());
         for (key, value) in more {
             let said = stated.has(*key) || key.alternatives().any(|(other, _)| stated.has(other));
             if law.takes(*key) && !said {
@@ -232,6 +273,7 @@ fn usual(key: Key, like: &Case) -> Option<Value> {
     }
     match key.entry().takes {
         Takes::Quantity(kind) => Some(Value::Number(key.entry().example, kind)),
+        Takes::Formula => Some(Value::Name(FORMULA.into())),
         takes @ Takes::Table => takes.parse_table(CURVE).ok(),
         takes @ Takes::Arms => takes.parse_table(ARMS).ok(),
         takes @ Takes::Springs => takes.parse_table(SPRINGS).ok(),
@@ -279,7 +321,9 @@ mod tests {
             let name = LawName::read(law).unwrap();
             assert!(there.model().is_ok(), "{law}");
             for key in keys_of_contacts().filter(|key| there.stated(*key).is_some()) {
-                assert!(name.takes(key) && !there.is_foreign(key), "{law}: {key}");
+                // Its text says what a formula takes.
+                assert!(name.takes(key) || law == "formula", "{law}: {key}");
+                assert!(!there.is_foreign(key), "{law}: {key}");
             }
             for next in laws() {
                 let change = there.law_change(next, &first).unwrap();

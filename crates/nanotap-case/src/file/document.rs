@@ -106,6 +106,9 @@ pub struct Document {
 /// Table of a case file that contains options of the study of the same name.
 const SCAN: &str = "scan";
 
+/// Table inside a table: its keys are those of the outer one, with the name of the inner one before them.
+const NESTED: &str = "sample.parameters";
+
 impl Document {
     /// Reads a TOML text.
     ///
@@ -132,9 +135,21 @@ impl Document {
                     place,
                 });
                 for (key, value) in inner {
-                    document
-                        .entries
-                        .push(entry(name, key.get_ref(), key.span(), value, &source));
+                    let nested = match value.get_ref() {
+                        DeValue::Table(nested) => Some(nested),
+                        _ => None,
+                    };
+                    let whole = format!("{name}.{}", key.get_ref());
+                    let Some(nested) = nested.filter(|_| NESTED == whole) else {
+                        let entry = entry(name, key.get_ref(), key.span(), value, &source);
+                        document.entries.push(entry);
+                        continue;
+                    };
+                    for (inner, value) in nested {
+                        let key = format!("{}.{}", key.get_ref(), inner.get_ref());
+                        let entry = entry(name, &key, inner.span(), value, &source);
+                        document.entries.push(entry);
+                    }
                 }
             } else {
                 document

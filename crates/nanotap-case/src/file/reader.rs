@@ -7,7 +7,7 @@ use super::document::{Document, Entry, Value as Written};
 use super::problem::{CaseFileError, Place, Problem, Problems, Source};
 use super::refusal;
 use crate::key::{Key, ModelKind, Section, Takes};
-use crate::quantity::Kind;
+use crate::quantity::{Kind, Quantity};
 use crate::stated::{Origin, Replaced, Said, Stated, Value};
 use nanotap_model::cantilever::{self, Cantilever, CosineTerm};
 use nanotap_model::contact::ContactLaw;
@@ -125,7 +125,9 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         };
         let key = match section {
             Section::Model => kind.key(&entry.key),
-            _ => section.key(&entry.key),
+            _ => section
+                .key(&entry.key)
+                .or_else(|| parameter(section, entry, known.keys().copied())),
         };
         let Some(key) = key else {
             problems.add(|| match section {
@@ -138,6 +140,10 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
             is_changed |= key != Key::DriveStart;
         } else {
             of_file.insert(key);
+        }
+        if key.is_of_formula() && entry.is_override() {
+            // Its value may be of another kind, or none.
+            known.retain(|other, _| *other == key || other.path() != key.path());
         }
         if entry.is_nothing() {
             known.remove(&key);
@@ -168,6 +174,23 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         });
     }
     known
+}
+
+/// The key of a parameter of a formula. Its value tells its kind; a number without a unit is one of the kind
+/// that a parameter of this name has already.
+fn parameter(section: Section, entry: &Entry, mut known: impl Iterator<Item = Key>) -> Option<Key> {
+    if section != Section::Sample {
+        return None;
+    }
+    let text = entry.text().unwrap_or_default();
+    let is_bare = text.trim().parse::<f64>().is_ok();
+    let same = |key: &Key| key.is_of_formula() && key.name() == entry.key;
+    if let Some(key) = known.find(same).filter(|_| is_bare) {
+        return Some(key);
+    }
+    let dimension = text.parse::<Quantity>().map(|read| read.dimension);
+    let kind = dimension.ok().and_then(Kind::of).unwrap_or(Kind::Number);
+    Key::of_formula(&entry.key, kind)
 }
 
 /// Entries of the file that an override of another key replaces, unless they were removed by their

@@ -18,7 +18,7 @@ use nanotap_model::contact::ContactLaw;
 use nanotap_model::drive_form::Actuation;
 
 /// Options of `[scan]` that name a file.
-const FILES: [&str; 2] = ["profile", "image"];
+pub(super) const FILES: [&str; 2] = ["profile", "image"];
 
 /// A dimensionless cantilever as a case file, every key written out.
 pub fn to_toml(case: &Cantilever) -> String {
@@ -108,7 +108,7 @@ impl Case {
         let mut scan = scan.clone();
         for name in FILES {
             if let Some(Json::String(file)) = scan.get_mut(name)
-                && let Ok(path) = self.relative_file(file)
+                && let Some(path) = self.relative_file(file)
                 && let Ok(path) = std::path::absolute(path)
             {
                 *file = path.display().to_string();

@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 
 use nanotap_volterra::laws::entry::{self, CaseKey, KeyEntry, ParameterEntry};
 use nanotap_volterra::laws::{
-    self, adhesion, capillary, electric, hysteresis, lennard_jones, prony, solvation, table,
+    self, adhesion, capillary, electric, hysteresis, lennard_jones, pair, prony, solvation, table,
     viscous,
 };
 
@@ -90,7 +90,7 @@ fn of_law(parameter: Parameter) -> Option<Entry> {
 }
 
 /// The key of a contact law alone.
-const fn of_laws(key: &KeyEntry) -> Entry {
+pub(super) const fn of_laws(key: &KeyEntry) -> Entry {
     Entry {
         alias: key.alias,
         label: key.label,
@@ -268,7 +268,7 @@ macro_rules! keys {
         #[expect(non_upper_case_globals, reason = "named as the variants of an enum")]
         #[expect(missing_docs, reason = "each entry has a meaning")]
         impl Key {
-            $($(pub const $key: Self = Self(($first + $group::$key as usize) as u8);)*)*
+            $($(pub const $key: Self = Self(($first + $group::$key as usize) as u16);)*)*
         }
         $(
             enum $group { $($key),* }
@@ -496,6 +496,18 @@ After from AFTER_LAWS => {
     SampleSolvationForce = of_parameter(&solvation::SOLVATION_FORCE);
     SampleSolvationPeriod = of_parameter(&solvation::SOLVATION_PERIOD);
     SampleSolvationDecay = of_parameter(&solvation::SOLVATION_DECAY);
+    SampleBondEnergy = of_parameter(&pair::BOND_ENERGY);
+    SampleBondLength = of_parameter(&pair::BOND_LENGTH);
+    SampleBondDecay = of_parameter(&pair::BOND_DECAY);
+    SamplePowerForce = of_parameter(&pair::POWER_FORCE);
+    SamplePowerDistance = of_parameter(&pair::POWER_DISTANCE);
+    SamplePower = of_parameter(&pair::POWER);
+    SamplePointCharge = of_parameter(&pair::POINT_CHARGE);
+    SamplePointChargeOfTip = of_parameter(&pair::TIP_POINT_CHARGE);
+    SampleForce = other(
+        Sample, "force", Takes::Formula,
+        "force as a formula of gap d and rate v (formula), with parameters under [sample.parameters]",
+    ).under(Laws::Nonlinear);
     SampleArms = other(
         Sample, "arms", Takes::Arms,
         "relaxing arms of a Prony series (prony-sphere, prony-cone, prony-punch): rows of time and modulus, or a CSV file of them",

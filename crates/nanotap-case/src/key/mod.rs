@@ -5,14 +5,16 @@
 mod keys;
 
 use std::borrow::Cow;
+use std::cmp::Ordering;
 use std::fmt;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, PoisonError, RwLock};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
 
-use nanotap_volterra::laws;
+use nanotap_formula::Formula;
 use nanotap_volterra::laws::entry::{CaseKey, KeyEntry, ParameterEntry};
+use nanotap_volterra::laws::{self, written};
 
 use super::near_name::near_name;
 use super::quantity::Kind;
@@ -23,9 +25,18 @@ use nanotap_model::oscillator::OscillatorParameter;
 use nanotap_model::parameter::{Applies, Parameter, Unit};
 use nanotap_model::words::words;
 
-/// A key of a case: an index into the table of keys.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Key(u8);
+/// A key of a case: an index into the table of keys, or behind its end that of a parameter of a formula.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Key(u16);
+
+/// The key of a parameter of a formula, with its path.
+struct Named {
+    entry: Entry,
+    path: String,
+}
+
+/// The keys of parameters of formulas, one a name and dimension, for as long as the program runs.
+static NAMED: RwLock<Vec<&'static Named>> = RwLock::new(Vec::new());
 
 words! {
     /// A table of a case file.
@@ -151,6 +162,8 @@ pub enum Takes {
     FrequencyRatio,
     /// A state at drive phase 0.
     State,
+    /// A formula of a force.
+    Formula,
     /// Rows of gap and force, or the name of a CSV file of them.
     Table,
     /// Rows of time and modulus, or the name of a CSV file of them.
@@ -355,14 +368,56 @@ static PATHS: LazyLock<Vec<String>> = LazyLock::new(|| {
 });
 
 impl Key {
-    /// All keys, in the order of the table.
+    /// All keys of the table, in its order; parameters of formulas are not in it.
     pub fn all() -> impl Iterator<Item = Self> + Clone {
-        (0..TABLE.len() as u8).map(Self)
+        (0..TABLE.len() as u16).map(Self)
     }
 
-    /// Returns the entry of the key in the table of keys.
+    /// Returns the entry of the key in the table of keys, or of a parameter of a formula.
     pub fn entry(self) -> &'static Entry {
-        &TABLE[usize::from(self.0)]
+        match self.named() {
+            Some(named) => &named.entry,
+            None => &TABLE[usize::from(self.0)],
+        }
+    }
+
+    fn named(self) -> Option<&'static Named> {
+        let number = usize::from(self.0).checked_sub(TABLE.len())?;
+        let named = NAMED.read().unwrap_or_else(PoisonError::into_inner);
+        named.get(number).copied()
+    }
+
+    /// The key `sample.parameters.NAME` of a formula's parameter of this kind; `None` if the name is none.
+    /// Equal names of different kinds are different keys.
+    pub(crate) fn of_formula(name: &str, kind: Kind) -> Option<Self> {
+        let parameter = name.strip_prefix(written::PARAMETERS)?;
+        let key =
+            Formula::is_name(parameter).then(|| written::key(parameter, kind.dimension()))??;
+        let mut all = NAMED.write().unwrap_or_else(PoisonError::into_inner);
+        let same = |named: &&Named| {
+            named.entry.name == key.name && named.entry.takes == Takes::Quantity(key.kind)
+        };
+        let number = all.iter().position(same).unwrap_or(all.len());
+        let index = u16::try_from(TABLE.len() + number).ok()?;
+        if number == all.len() {
+            all.push(Box::leak(Box::new(Named {
+                entry: keys::of_laws(&key),
+                path: format!("{}.{}", Section::Sample.name(), key.name),
+            })));
+        }
+        Some(Self(index))
+    }
+
+    /// Whether a path is that of a parameter of a formula.
+    pub fn is_parameter(path: &str) -> bool {
+        let name = path.strip_prefix("sample.");
+        let name = name.and_then(|name| name.strip_prefix(written::PARAMETERS));
+        name.is_some_and(Formula::is_name)
+    }
+
+    /// Whether it is that of a parameter of a formula.
+    pub(crate) fn is_of_formula(self) -> bool {
+        usize::from(self.0) >= TABLE.len()
     }
 
     /// Returns the table of the case file that contains the key.
@@ -377,7 +432,10 @@ impl Key {
 
     /// Path in the case: `alpha1`, `cantilever.k`.
     pub fn path(self) -> &'static str {
-        &PATHS[usize::from(self.0)]
+        match self.named() {
+            Some(named) => &named.path,
+            None => &PATHS[usize::from(self.0)],
+        }
     }
 
     /// Returns the alternative name of the key, if it has one.
@@ -455,11 +513,11 @@ impl Key {
     /// The key of a parameter of the cantilever.
     pub const fn of(parameter: Parameter) -> Self {
         // The table begins with the parameters.
-        Self(parameter.index() as u8)
+        Self(parameter.index() as u16)
     }
 
     /// The key that states a parameter of nonlinear laws.
-    pub(crate) fn of_law_parameter(parameter: &ParameterEntry) -> Option<Self> {
+    pub fn of_law_parameter(parameter: &ParameterEntry) -> Option<Self> {
         match &parameter.key {
             CaseKey::Body(path) => Self::find(path),
             CaseKey::Own(key) => Self::of_law(key),
@@ -473,7 +531,9 @@ impl Key {
         } else {
             Section::Sample
         };
-        section.key(key.name)
+        section
+            .key(key.name)
+            .or_else(|| Self::of_formula(key.name, key.kind))
     }
 
     /// The key of `[sample]` that states a number of a linear contact law.
@@ -519,6 +579,9 @@ impl Key {
         section.key(name)
     }
 
+    /// The last key of the sample in the table.
+    const LAST_OF_SAMPLE: Self = Self::SampleHorizon;
+
     /// The frequency of each further tone over that of the first, in a dimensionless case.
     pub const TONE_RATIOS: [Self; MAX_TONES - 1] = [Self::Tone2Ratio, Self::Tone3Ratio];
 
@@ -541,6 +604,7 @@ impl Key {
                 Some("it is a table; vary relaxation_stiffness_factor or relaxation_time_factor")
             }
             Takes::LeverModes | Takes::ModelLeverModes => Some("it is a table"),
+            Takes::Formula => Some("it is a formula; vary one of its parameters"),
             Takes::Word(_) | Takes::Law | Takes::LeverName | Takes::MaterialName => {
                 Some("it is a name, not a quantity")
             }
@@ -575,6 +639,27 @@ impl Key {
             (_, Default::Number(value)) => Some(value),
             _ => None,
         }
+    }
+}
+
+impl Ord for Key {
+    /// In the order of the table, with parameters of formulas behind the other keys of the sample.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let place = |key: Self| {
+            let last = Self::LAST_OF_SAMPLE.0;
+            if key.is_of_formula() {
+                (last, key.0)
+            } else {
+                (key.0, 0)
+            }
+        };
+        place(*self).cmp(&place(*other))
+    }
+}
+
+impl PartialOrd for Key {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
 }
 
@@ -693,6 +778,25 @@ mod tests {
                     "{key} {other}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn parameters_of_formulas_stand_with_the_sample() {
+        let key = |name, kind| Key::of_formula(name, kind).unwrap();
+        let [modulus, other] = [Kind::Pressure, Kind::Force].map(|kind| key("parameters.E", kind));
+        assert_eq!(key("parameters.E", Kind::Pressure), modulus);
+        assert_ne!(modulus, other);
+        assert_eq!(modulus.path(), "sample.parameters.E");
+        assert_eq!(Section::Sample.keys().last(), Some(Key::LAST_OF_SAMPLE));
+        assert!(modulus > Key::LAST_OF_SAMPLE && modulus < Key::DriveFrequency);
+        for name in [
+            "parameters.d",
+            "parameters.2x",
+            "parameters.",
+            "parameter.E",
+        ] {
+            assert_eq!(Key::of_formula(name, Kind::Force), None, "{name}");
         }
     }
 

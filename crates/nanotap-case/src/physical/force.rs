@@ -3,12 +3,13 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use nanotap_formula::FormulaError;
 use nanotap_volterra::VolterraError;
 use nanotap_volterra::laws::curve::Interpolation;
 use nanotap_volterra::laws::entry::{CONTACT_DISTANCE, CaseKey, ParameterEntry};
 use nanotap_volterra::laws::prony::Arms;
 use nanotap_volterra::laws::table::Rows;
-use nanotap_volterra::laws::{self, TableLaw, adhesion};
+use nanotap_volterra::laws::{self, TableLaw, adhesion, written};
 
 use super::elastic::Elastic;
 use super::error::PhysicalError;
@@ -20,6 +21,7 @@ use super::tip::Tip;
 use crate::force_table::{ArmTable, ForceTable};
 use crate::key::{Key, Laws};
 use crate::quantity::Kind;
+use crate::stated::{Stated, Value};
 use nanotap_model::contact::ContactLaw;
 use nanotap_model::parameter::Applies;
 use nanotap_model::sample_law::SampleLaw;
@@ -42,7 +44,8 @@ impl PartialEq for SampleForce {
         self.values == other.values
             && self.table == other.table
             && self.arms == other.arms
-            && self.names() == other.names()
+            && self.terms.len() == other.terms.len()
+            && (self.terms.iter().zip(&other.terms)).all(|(a, b)| std::ptr::eq(a.entry, b.entry))
     }
 }
 
@@ -56,8 +59,18 @@ pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
     keys_of(Laws::Nonlinear).chain(keys_of(Laws::Some))
 }
 
-/// True if these nonlinear laws have a key of [`keys_of_contacts`].
+/// The keys of [`keys_of_contacts`], and those of a formula's parameters that are stated.
+pub(crate) fn keys_of_contact(stated: &Stated) -> impl Iterator<Item = Key> {
+    let parameters = stated.iter().map(|(key, _)| key);
+    keys_of_contacts().chain(parameters.filter(|key| key.is_of_formula()))
+}
+
+/// True if these nonlinear laws have a key of [`keys_of_contact`]. Before the text of a formula is
+/// known, any parameter may belong to it.
 pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
+    if key.is_of_formula() && terms.iter().any(|term| term.needs_formula()) {
+        return true;
+    }
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
     let mut keys = terms.iter().flat_map(|term| term.entry.keys());
     parameters.clone().any(|p| key_of(p) == key)
@@ -65,6 +78,10 @@ pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
         || [Key::SampleTable, Key::SampleInterpolation].contains(&key)
             && terms.iter().any(|term| term.has_rows())
         || key == Key::SampleArms && terms.iter().any(|term| term.has_arms())
+        || key == Key::SampleForce
+            && terms
+                .iter()
+                .any(|term| term.needs_formula() || term.text().is_some())
         || key == Key::SampleMaterial && parameters.any(|p| p.name == "modulus")
 }
 
@@ -104,13 +121,72 @@ fn unit(parameter: &ParameterEntry) -> f64 {
     }
 }
 
+/// True if these laws have a formula, which need not use each quantity that could be in it: while one is
+/// being written some are left over.
+fn may_be_unused(terms: &[&'static TableLaw], key: Key) -> bool {
+    let known = || written::KNOWN.iter().any(|(_, p)| key_of(p) == key);
+    terms.iter().any(|term| term.text().is_some()) && (key.is_of_formula() || known())
+}
+
+/// The law of a formula with the stated parameters.
+fn formula_with(stated: &Stated, text: &str) -> Result<&'static TableLaw, FormulaError> {
+    let keys = keys_of_contact(stated).filter(|key| key.is_of_formula());
+    let parameters: Vec<_> = keys
+        .filter_map(|key| {
+            let parameter = key.name().strip_prefix(written::PARAMETERS)?;
+            Some((parameter, key.kind().dimension()))
+        })
+        .collect();
+    written::law(text, &parameters)
+}
+
+/// The laws that a text names, with the stated formula if it is one and can be read.
+pub(crate) fn terms_with(stated: &Stated, name: &str) -> Option<Vec<&'static TableLaw>> {
+    let mut terms = SampleLaw::terms(name).ok()?;
+    if let (Some(term), Some(Value::Name(text))) = (
+        terms.iter_mut().find(|term| term.needs_formula()),
+        stated.get(Key::SampleForce),
+    ) && let Ok(formula) = formula_with(stated, text)
+    {
+        *term = formula;
+    }
+    Some(terms)
+}
+
+/// The laws with the stated formula in place of the entry that stands for any.
+fn with_formula(
+    reader: Reader<'_>,
+    name: &str,
+    mut terms: Vec<&'static TableLaw>,
+) -> Result<Vec<&'static TableLaw>, PhysicalError> {
+    let mut unknown = terms.iter_mut().filter(|term| term.needs_formula());
+    let Some(term) = unknown.next() else {
+        return Ok(terms);
+    };
+    if unknown.next().is_some() {
+        let reason = "write the sum of two formulas as one";
+        return Err(PhysicalError::impossible(Key::SampleLaw, name, reason));
+    }
+    let text = reader.name(Key::SampleForce).ok_or_else(|| {
+        let reason = format!(
+            "sample.law = \"{name}\" needs its formula, as in force = \"k*max(-d, 0) - c*v\" with the \
+             parameters under [sample.parameters]"
+        );
+        PhysicalError::missing(Key::SampleForce, reason)
+    })?;
+    *term = formula_with(reader.stated, text)
+        .map_err(|error| reader.impossible(Key::SampleForce, error.to_string()))?;
+    Ok(terms)
+}
+
 impl SampleForce {
     /// Reads `[sample]` if its law is nonlinear.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Option<Self>, PhysicalError> {
         let Some(name) = reader.name(Key::SampleLaw) else {
             let law = crate::file::word(reader.stated, Key::SampleLaw).unwrap_or_default();
             let strange = |key: &Key| reader.has(*key) && !linear_takes(law, *key);
-            return keys_of(Laws::Nonlinear).find(strange).map_or(Ok(None), |key| {
+            let parameters = keys_of_contact(reader.stated).filter(|key| key.is_of_formula());
+            return keys_of(Laws::Nonlinear).chain(parameters).find(strange).map_or(Ok(None), |key| {
                 let reason = if let Some(number) = key.law_number() {
                     let others = ContactLaw::ALL.map(|law| (law, Applies::Law(law)));
                     let other = others.iter().find(|(_, of)| number.entry().applies == *of);
@@ -127,8 +203,11 @@ impl SampleForce {
         };
         let refused = |reason: String| PhysicalError::impossible(Key::SampleLaw, name, reason);
         let terms = SampleLaw::terms(name).map_err(|error| refused(error.to_string()))?;
+        let terms = with_formula(reader, name, terms)?;
         let parameters = || terms.iter().flat_map(|term| term.entry.parameters);
-        let strange = keys_of_contacts().find(|key| reader.has(*key) && !takes(&terms, *key));
+        let strange = |key: &Key| reader.has(*key) && !takes(&terms, *key);
+        let mut strange = keys_of_contact(reader.stated).filter(strange);
+        let strange = strange.find(|key| !may_be_unused(&terms, *key));
         if let Some(key) = strange {
             let mut keys: Vec<&str> = Vec::new();
             let tables = [Key::SampleTable, Key::SampleArms].into_iter();
@@ -195,6 +274,9 @@ impl SampleForce {
             |error| match error {
                 VolterraError::Flows if !reader.has(Key::SampleModulus) => {
                     PhysicalError::missing(Key::SampleModulus, error.to_string())
+                }
+                VolterraError::Formula(error) => {
+                    reader.impossible(Key::SampleForce, error.to_string())
                 }
                 _ => refused(error.to_string()),
             },
@@ -438,6 +520,14 @@ impl SampleForce {
                 material.name, material.source
             )));
         }
+        let unused = keys_of_contact(reader.stated)
+            .filter(|key| reader.has(*key) && !takes(&self.terms, *key))
+            .filter(|key| may_be_unused(&self.terms, *key));
+        remarks.extend(
+            unused.map(|key| {
+                Remark::note(format!("{key} is stated, and the formula does not use it"))
+            }),
+        );
         let mut assumed: Vec<(Key, f64)> = self
             .parameters()
             .filter(|(parameter, key, _)| parameter.assumed && !reader.has(*key))

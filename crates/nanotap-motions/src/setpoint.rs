@@ -35,17 +35,29 @@ use crate::approach::distance_sweep::{
 };
 use crate::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way};
 use crate::frequency_modulation::{self, FrequencyModulationOptions};
-use nanotap_case::document::{CaseDocument, WithoutDistanceDocument};
-use nanotap_case::physical::{Held, Kind, Remark};
+use nanotap_case::document::{CaseDocument, WithoutDistanceDocument, equilibria};
+use nanotap_case::physical::{Held, Kind, Physical, Remark};
+use nanotap_case::units::Units;
 use nanotap_case::{Case, Key};
 use nanotap_error::Error;
 use nanotap_error::ErrorDocument;
 use nanotap_error::ErrorKind;
+use nanotap_model::Model;
 use nanotap_model::model_map::ModelMap;
+use nanotap_model::nonlinear::Equilibrium;
+use nanotap_observe::frame::{Cell, Frame, Rows, frame};
 use nanotap_observe::table::{Observable, shown_phase};
 use nanotap_observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
 use nanotap_study::FreeMotion;
 use nanotap_study::value::Amount;
+
+mod margin;
+mod near;
+mod states;
+
+pub use margin::end_at_setpoint;
+pub use near::{NearOrbit, orbit_at_setpoint};
+pub use states::{SetpointStates, StateSearch, Undecided, states_at_setpoint};
 
 /// A distance at which an orbit has the setpoint amplitude.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -134,6 +146,26 @@ impl SetpointReport {
     /// The distance that the approach reaches, in m.
     pub fn zc(&self) -> f64 {
         self.solutions.get(self.chosen).map_or(f64::NAN, |s| s.zc)
+    }
+
+    /// The distances at which an orbit is at the setpoint. Quantities are in SI.
+    pub fn solution_table(&self) -> Frame<'_> {
+        let way = |s: &SetpointSolution| match (s.stable, s.reached) {
+            (true, true) => "stable, reached on approach",
+            (true, false) => "stable",
+            (false, true) => "unstable, reached on approach",
+            (false, false) => "unstable",
+        };
+        frame! { Rows::new("solutions", &self.solutions, None);
+            "gap.tip", "gap.tip", (Length, Prefixed(5)) => |s| s.zc;
+            "period", "period", Plain => |s| s.period;
+            "phase", "phase", (Angle, Digits(4)) => |s| s.observables.phase;
+            "E_dis", "E_dis", (Energy, Quantity([4, 4])) => |s| s.physical.observables.dissipation;
+            "F_max", "F_max", (Force, Prefixed(4)) => |s| s.physical.observables.peak_force;
+            "", "", Plain => way;
+            "stable", "stable", Plain => |s| s.stable; .only_in_files();
+            "reached", "reached on approach", Plain => |s| s.reached; .only_in_files();
+        }
     }
 
     /// Describes the held quantity with its value, as in "the peak force is 1 nN".
@@ -249,26 +281,16 @@ impl SetpointReport {
 /// # Errors
 /// When there is none to solve, or none is reached on approach.
 pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, Error> {
-    let none = || {
-        Error::input(
-            "the case has no setpoint: give drive.setpoint, as in setpoint = 0.8",
-            "give drive.setpoint",
-        )
-    };
-    let view = case.physical().ok_or_else(none)?;
-    let setpoint = view.held.ok_or_else(none)?;
-    let free = FreeMotion::of(&case.model()?);
-    if !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(nothing_to_hold());
-    }
+    let view = case.physical().ok_or_else(no_setpoint)?;
+    let setpoint = view.held.ok_or_else(no_setpoint)?;
     if let Held::Shift(shift) = setpoint {
-        return solve_shift(case, shift, &free, control);
+        return solve_shift(case, shift, &moving_tip(case)?, control);
     }
-    let held = HeldQuantity::new(setpoint, &free, view.scales.force)?;
+    let (held, free) = held_quantity(case)?;
     let mut search = Search::new(case, held, free);
     let range = (0.0, FARTHER * free.reach);
     let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
-    let place = approach(&mut sweep, std::slice::from_mut(&mut search), control)?;
+    let (_, place) = approach(&mut sweep, std::slice::from_mut(&mut search), control)?;
     let reached = search.result(&sweep)?;
     // What a lever shows at this distance that comes from near.
     sweep.allow_steps(OTHERS_STEPS);
@@ -276,7 +298,7 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     sweep.way(place, reached.gap, |_, _| false);
     let budget = sweep.spent_budget().map(budget_text);
     sweep.allow_steps(u64::MAX);
-    let (mut solutions, other_states) = search.others(&sweep, &reached, control);
+    let (mut solutions, other_states) = search.others(&sweep, Some(&reached), reached.gap, control);
     if control.is_cancelled() {
         return Err(cancelled());
     }
@@ -301,6 +323,32 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         other_states,
         budget,
     })
+}
+
+/// The error of a case without a setpoint.
+fn no_setpoint() -> Error {
+    Error::input(
+        "the case has no setpoint: give drive.setpoint, as in setpoint = 0.8",
+        "give drive.setpoint",
+    )
+}
+
+/// The free motion of a case whose drive moves the tip.
+fn moving_tip(case: &Case) -> Result<FreeMotion, Error> {
+    let free = FreeMotion::of(&case.model()?);
+    if !(free.reach > 0.0 && free.reach.is_finite()) {
+        return Err(nothing_to_hold());
+    }
+    Ok(free)
+}
+
+/// The held quantity of a case, and its free motion.
+fn held_quantity(case: &Case) -> Result<(HeldQuantity, FreeMotion), Error> {
+    let view = case.physical().ok_or_else(no_setpoint)?;
+    let setpoint = view.held.ok_or_else(no_setpoint)?;
+    let free = moving_tip(case)?;
+    let held = HeldQuantity::new(setpoint, &free, view.scales.force)?;
+    Ok((held, free))
 }
 
 /// Solves a frequency shift, in Hz, for the distance.
@@ -421,12 +469,13 @@ const fn branch_of(seen: &Observables) -> &'static str {
     }
 }
 
-/// Follows the lever from far until every search has ended; the place where it is then.
+/// Follows the lever from far until every search has ended; the pieces of its way, and the place where it
+/// is then.
 fn approach(
     sweep: &mut DistanceSweep<'_>,
     searches: &mut [Search<'_>],
     control: &Control<'_>,
-) -> Result<Place, Error> {
+) -> Result<(Vec<Piece>, Place), Error> {
     let place = sweep.free()?;
     sweep.piece_a_step = true;
     let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| {
@@ -448,7 +497,7 @@ fn approach(
     for search in searches {
         search.nearest_gap = nearest.unwrap_or(search.nearest_gap);
     }
-    Ok(place)
+    Ok((pieces, place))
 }
 
 /// A distance at which a setpoint is first reached from far.
@@ -475,10 +524,7 @@ pub fn reached_distances(
     let Some(case) = cases.first() else {
         return Ok(Vec::new());
     };
-    let free = FreeMotion::of(&case.model()?);
-    if !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(nothing_to_hold());
-    }
+    let free = moving_tip(case)?;
     let held = case.physical().and_then(|view| view.held);
     if matches!(held, Some(Held::Shift(_))) {
         return shifted_distances(cases, control);
@@ -630,6 +676,86 @@ pub fn note_of_several_tones(case: &Case) -> Option<String> {
          them with their loops and finds the distance; with gap.tip the case is shown at a distance"
             .to_owned()
     })
+}
+
+/// The tables of a case: its numbers, of a physical one with the quantities that they stand for, and
+/// where the undriven lever rests, if the sample attracts.
+pub fn case_tables(case: &Case) -> Vec<Frame<'static>> {
+    let Some(view) = case.physical() else {
+        return vec![number_table(case)];
+    };
+    let rests = equilibria(case);
+    let mut tables = vec![mapping_table(view)];
+    if !rests.is_empty() {
+        tables.push(rest_table(rests, Units::Si(view.scales)));
+    }
+    tables
+}
+
+/// The numbers of a dimensionless case.
+fn number_table(case: &Case) -> Frame<'static> {
+    let of_key = |key: Key, value: f64| {
+        let cell = Cell::Number(value);
+        let alias = key.alias().unwrap_or(key.name());
+        (key.symbol(), key.name(), alias, cell, key.meaning())
+    };
+    let lever = case.cantilever();
+    let mut rows: Vec<(_, _, _, Cell, _)> = match lever {
+        Some(lever) => (lever.parameters().into_iter())
+            .map(|parameter| of_key(Key::of(parameter), lever.get(parameter)))
+            .collect(),
+        None => (case.keys().into_iter())
+            .map(|key| of_key(key, case.get(key)))
+            .collect(),
+    };
+    if let Some(lever) = lever {
+        let modes = Cell::Count(lever.modes);
+        rows.insert(0, ("N", "modes", "", modes, "beam modes"));
+        let contact = Cell::Word(lever.contact.name().to_owned());
+        rows.push(("", "contact", "", contact, lever.contact.meaning()));
+    }
+    let without: &[&str] = if lever.is_some() { &[] } else { &["alias"] };
+    frame! { Rows::new("numbers", rows, None);
+        "symbol", "", Plain => |(symbol, ..)| symbol;
+        "key", "key", Plain => |(_, key, ..)| key;
+        "alias", "or", Plain => |(_, _, alias, ..)| alias;
+        "value", "value", Plain => |(.., value, _)| value;
+        .align(Point);
+        "meaning", "meaning", Plain => |(.., meaning)| meaning;
+        .without(without);
+    }
+}
+
+/// The numbers of the equations with the quantities that they stand for.
+fn mapping_table(view: &Physical) -> Frame<'static> {
+    frame! { Rows::new("mapping", view.mapping(), None);
+        "symbol", "", Plain => |row| Key::of(row.parameter).symbol();
+        "parameter", "key", Plain => |row| row.parameter.name();
+        "value", "value", Digits(6) => |row| row.value;
+        "formula", "is", Plain => |row| row.formula;
+        "quantity", "of", Plain => |row| row.quantity;
+        "", "", Plain => |row| row.kind.format(row.si);
+        "si", "quantity in SI", Digits(6) => |row| row.si; .only_in_files();
+        "unit", "its unit", Plain => |row| row.kind.si_unit(); .only_in_files();
+    }
+}
+
+/// Where the undriven lever rests.
+fn rest_table(all: Vec<Equilibrium>, units: Units) -> Frame<'static> {
+    let way = |rest: Equilibrium| match (rest.stable, rest.contact) {
+        (true, true) => "stable, in contact",
+        (true, false) => "stable",
+        (false, true) => "unstable, in contact",
+        (false, false) => "unstable",
+    };
+    frame! { Rows::new("equilibria", all, Some(units));
+        "gap", "gap", (Length, Prefixed(4)) => |rest| rest.gap;
+        "deflection", "deflection", (Length, Prefixed(4)) => |rest| rest.deflection;
+        "force", "force", (Force, Prefixed(4)) => |rest| rest.force;
+        "", "", Plain => way;
+        "stable", "stable", Plain => |rest| rest.stable; .only_in_files();
+        "contact", "in contact", Plain => |rest| rest.contact; .only_in_files();
+    }
 }
 
 impl SolvedCase {
@@ -805,6 +931,17 @@ struct Sample<'a> {
     value: f64,
 }
 
+impl<'a> Sample<'a> {
+    /// An orbit with its distance and value.
+    const fn of((gap, orbit, value): &'a (f64, PeriodicOrbit, f64)) -> Self {
+        Self {
+            gap: *gap,
+            orbit,
+            value: *value,
+        }
+    }
+}
+
 /// The held quantity of an orbit at a distance; NaN where it cannot be measured.
 fn value_at(
     held: &HeldQuantity,
@@ -843,15 +980,27 @@ impl HeldQuantity {
                 return Trace::Averages(found.par_iter().map(average).collect());
             }
         };
+        Trace::Orbits(self.along_stretch(sweep, stretch, [piece.from, piece.to]))
+    }
+
+    /// Distance, orbit and value for each orbit of a stretch between two distances, the first one first.
+    fn along_stretch(
+        &self,
+        sweep: &DistanceSweep<'_>,
+        stretch: usize,
+        [from, to]: [f64; 2],
+    ) -> Vec<(f64, PeriodicOrbit, f64)> {
         let points = &sweep.stretches[stretch].points;
+        let (low, high) = (from.min(to), from.max(to));
         let inside = points
             .iter()
-            .rev()
-            .filter(|p| p.parameter < piece.from && p.parameter > piece.to);
-        let mut gaps: Vec<(f64, Option<PeriodicOrbit>)> =
-            vec![(piece.from, sweep.orbit_at(stretch, piece.from))];
+            .filter(|p| p.parameter > low && p.parameter < high);
+        let mut gaps: Vec<(f64, Option<PeriodicOrbit>)> = vec![(low, sweep.orbit_at(stretch, low))];
         gaps.extend(inside.map(|p| (p.parameter, Some(p.orbit.clone()))));
-        gaps.push((piece.to, sweep.orbit_at(stretch, piece.to)));
+        gaps.push((high, sweep.orbit_at(stretch, high)));
+        if from > to {
+            gaps.reverse();
+        }
         let orbits: Vec<(f64, PeriodicOrbit)> = gaps
             .into_iter()
             .filter_map(|(gap, orbit)| Some((gap, orbit?)))
@@ -860,7 +1009,7 @@ impl HeldQuantity {
             let value = value_at(self, sweep, gap, &orbit);
             (gap, orbit, value)
         });
-        Trace::Orbits(valued.collect())
+        valued.collect()
     }
 }
 
@@ -1003,34 +1152,48 @@ impl Search<'_> {
         false
     }
 
-    /// The other orbits with the setpoint's amplitude, and the other stable orbits at the chosen
-    /// distance, on the branch of the orbit that is reached.
+    /// The orbits at the setpoint other than the one that is reached, and the other stable orbits at a
+    /// distance: on the branches of these orbits and of those that the lever was seen on.
     fn others(
         &self,
         sweep: &DistanceSweep<'_>,
-        reached: &SetpointSolution,
+        reached: Option<&SetpointSolution>,
+        at: f64,
         control: &Control<'_>,
     ) -> (Vec<SetpointSolution>, Vec<SetpointState>) {
         let mut solutions: Vec<SetpointSolution> = Vec::new();
         let mut seeds: Vec<(f64, PeriodicOrbit)> = Vec::new();
         for (k, stretch) in sweep.stretches.iter().enumerate() {
-            let orbit = stretch
-                .holds(reached.gap)
-                .then(|| sweep.orbit_at(k, reached.gap));
+            let orbit = stretch.holds(at).then(|| sweep.orbit_at(k, at));
             if let Some(orbit) = orbit.flatten().filter(PeriodicOrbit::is_stable)
                 && !seeds.iter().any(|(_, other)| is_same(other, &orbit))
             {
-                seeds.push((reached.gap, orbit));
+                seeds.push((at, orbit));
             }
         }
         let is_reached = |orbit: &PeriodicOrbit| {
-            orbit.period == reached.period
-                && orbit.nearest(&reached.state).1 <= 1e-6 * orbit.scale()
+            reached.is_some_and(|reached| {
+                orbit.period == reached.period
+                    && orbit.nearest(&reached.state).1 <= 1e-6 * orbit.scale()
+            })
         };
         let others = seeds.iter().filter(|(_, orbit)| !is_reached(orbit));
         let states = others
             .filter_map(|(gap, orbit)| self.state(*gap, orbit))
             .collect();
+        for (k, stretch) in sweep.stretches.iter().enumerate() {
+            let [low, high] = [0, 1].map(|end| stretch.ends[end].0);
+            let trace = self.held.along_stretch(sweep, k, [low, high]);
+            let samples: Vec<Sample<'_>> = trace.iter().map(Sample::of).collect();
+            let before = solutions.len();
+            self.add_crossings(sweep, &samples, reached, &mut solutions);
+            if solutions.len() > before
+                && !stretch.holds(at)
+                && let Some((gap, orbit, _)) = trace.get(trace.len() / 2)
+            {
+                seeds.push((*gap, orbit.clone()));
+            }
+        }
         let over = ContinuationOptions::over(0.0, sweep.farthest());
         let max_points = sweep.points_in(OTHERS_STEPS) / seeds.len().max(1);
         let options = DiagramOptions {
@@ -1057,28 +1220,42 @@ impl Search<'_> {
                 .with_max_len(1)
                 .map(|p| value_at(&self.held, sweep, p.parameter, &p.orbit))
                 .collect();
-            for (pair, both) in points.windows(2).zip(values.windows(2)) {
-                let [a, b] = [0, 1].map(|k| Sample {
-                    gap: pair[k].parameter,
-                    orbit: &pair[k].orbit,
-                    value: both[k],
-                });
-                if (a.value > self.held.target) != (b.value > self.held.target)
-                    && let Some(solution) = self.crossing(sweep, &a, &b)
-                {
-                    let near = 1e-9 * self.free.reach.max(solution.gap.abs());
-                    let known = |s: &SetpointSolution| {
-                        s.period == solution.period
-                            && (s.gap - solution.gap).abs() <= near
-                            && (s.observables.phase - solution.observables.phase).abs() < 1e-4
-                    };
-                    if !solutions.iter().chain([reached]).any(known) {
-                        solutions.push(solution);
-                    }
-                }
-            }
+            let samples = points.iter().zip(&values).map(|(point, &value)| Sample {
+                gap: point.parameter,
+                orbit: &point.orbit,
+                value,
+            });
+            let samples: Vec<Sample<'_>> = samples.collect();
+            self.add_crossings(sweep, &samples, reached, &mut solutions);
         }
         (solutions, states)
+    }
+
+    /// Adds the orbits at the setpoint between neighbouring orbits of a branch, unless they are known.
+    fn add_crossings(
+        &self,
+        sweep: &DistanceSweep<'_>,
+        samples: &[Sample<'_>],
+        reached: Option<&SetpointSolution>,
+        solutions: &mut Vec<SetpointSolution>,
+    ) {
+        for pair in samples.windows(2) {
+            if (pair[0].value > self.held.target) == (pair[1].value > self.held.target) {
+                continue;
+            }
+            let Some(solution) = self.crossing(sweep, &pair[0], &pair[1]) else {
+                continue;
+            };
+            let near = 1e-9 * self.free.reach.max(solution.gap.abs());
+            let known = |s: &SetpointSolution| {
+                s.period == solution.period
+                    && (s.gap - solution.gap).abs() <= near
+                    && (s.observables.phase - solution.observables.phase).abs() < 1e-4
+            };
+            if !solutions.iter().chain(reached).any(known) {
+                solutions.push(solution);
+            }
+        }
     }
 
     /// A stable orbit at the chosen distance, measured.
@@ -1108,68 +1285,105 @@ impl Search<'_> {
         a: &Sample<'_>,
         b: &Sample<'_>,
     ) -> Option<SetpointSolution> {
-        let view = self.case.physical()?;
-        let target = self.held.target;
-        let (mut low, mut high) = ((0.0, a.value), (1.0, b.value));
-        let mut closed: Option<(f64, PeriodicOrbit, Observables)> = None;
-        for _ in 0..STEPS {
-            // The curve is nearly straight between two points of a branch.
-            let slope = (high.1 - low.1) / (high.0 - low.0);
-            let middle = low.0 + (target - low.1) / slope;
-            let t = if middle.is_finite() && middle > low.0 && middle < high.0 {
-                middle
-            } else {
-                0.5 * (low.0 + high.0)
-            };
-            let (gap, orbit, observables) = orbit_between(sweep, a, b, t)?;
-            let value = self.held.of(&observables);
-            closed = Some((gap, orbit, observables));
-            if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
-                break;
-            }
-            if (value > target) == (low.1 > target) {
-                low = (t, value);
-            } else {
-                high = (t, value);
-            }
-        }
-        let (gap, orbit, observables) = closed?;
-        // Where a fold lies between the points, Newton may have closed the other orbit.
-        if (self.held.of(&observables) - target).abs() > 1e-6 * target.abs() {
-            return None;
-        }
-        let state = orbit.states.first().cloned().unwrap_or_default();
-        Some(SetpointSolution {
-            gap,
-            zc: gap * view.scales.length,
-            period: orbit.period,
-            stable: orbit.is_stable(),
-            spectral_radius: orbit.spectral_radius(),
-            reached: false,
-            branch: branch_of(&observables),
-            physical: PhysicalMotion::of(&observables, view).with_state(&state, view),
-            state,
-            observables,
-        })
+        crossing(self.case, &self.held, &|gap| sweep.model(gap).ok(), a, b)
     }
+}
+
+/// The model of a case at a distance.
+type ModelAt<'a> = &'a dyn Fn(f64) -> Option<Model>;
+
+/// The orbit between two of a branch that is at the setpoint.
+fn crossing(
+    case: &Case,
+    held: &HeldQuantity,
+    model_at: ModelAt<'_>,
+    a: &Sample<'_>,
+    b: &Sample<'_>,
+) -> Option<SetpointSolution> {
+    let target = held.target;
+    let (mut low, mut high) = ((0.0, a.value), (1.0, b.value));
+    let mut closed: Option<(f64, PeriodicOrbit, Observables)> = None;
+    for _ in 0..STEPS {
+        // The curve is nearly straight between two points of a branch.
+        let slope = (high.1 - low.1) / (high.0 - low.0);
+        let middle = low.0 + (target - low.1) / slope;
+        let t = if middle.is_finite() && middle > low.0 && middle < high.0 {
+            middle
+        } else {
+            0.5 * (low.0 + high.0)
+        };
+        let (gap, orbit, observables) = orbit_between(model_at, a, b, t)?;
+        let value = held.of(&observables);
+        closed = Some((gap, orbit, observables));
+        if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
+            break;
+        }
+        if (value > target) == (low.1 > target) {
+            low = (t, value);
+        } else {
+            high = (t, value);
+        }
+    }
+    let (gap, orbit, observables) = closed?;
+    // Where a fold lies between the points, Newton may have closed the other orbit.
+    if (held.of(&observables) - target).abs() > 1e-6 * target.abs() {
+        return None;
+    }
+    solution(case, gap, &orbit, &observables)
+}
+
+/// An orbit at the setpoint.
+fn solution(
+    case: &Case,
+    gap: f64,
+    orbit: &PeriodicOrbit,
+    observables: &Observables,
+) -> Option<SetpointSolution> {
+    let view = case.physical()?;
+    let state = orbit.states.first().cloned().unwrap_or_default();
+    Some(SetpointSolution {
+        gap,
+        zc: gap * view.scales.length,
+        period: orbit.period,
+        stable: orbit.is_stable(),
+        spectral_radius: orbit.spectral_radius(),
+        reached: false,
+        branch: branch_of(observables),
+        physical: PhysicalMotion::of(observables, view).with_state(&state, view),
+        state,
+        observables: *observables,
+    })
 }
 
 /// The orbit at a share `t` of the way from one orbit of a branch to the next.
 fn orbit_between(
-    sweep: &DistanceSweep<'_>,
+    model_at: ModelAt<'_>,
     a: &Sample<'_>,
     b: &Sample<'_>,
     t: f64,
 ) -> Option<(f64, PeriodicOrbit, Observables)> {
     let gap = a.gap + t * (b.gap - a.gap);
-    let model = sweep.model(gap).ok()?;
-    let mut map = ModelMap::new(&model);
     let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
     let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
-    let period = a.orbit.period;
+    let (orbit, observables) = closed(&model_at(gap)?, &points, a.orbit.period)?;
+    Some((gap, orbit, observables))
+}
+
+/// The orbit of a period near the states of another one, and what is measured on it.
+fn closed(model: &Model, points: &[f64], period: usize) -> Option<(PeriodicOrbit, Observables)> {
+    let mut map = ModelMap::new(model);
     let options = ShootingOptions::default();
-    let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
+    let orbit = close_orbit_from_points(&mut map, points, period, &options).ok()?;
+    measured(model, orbit, period)
+}
+
+/// An orbit and what is measured on it, unless its period is another one.
+fn measured(
+    model: &Model,
+    orbit: PeriodicOrbit,
+    period: usize,
+) -> Option<(PeriodicOrbit, Observables)> {
     let start = orbit.states.first()?;
-    let observables = measure(&model, start, orbit.period, ObservableSet::COMMON).ok()?;
-    (orbit.period == period).then_some((gap, orbit, observables))
+    let observables = measure(model, start, orbit.period, ObservableSet::COMMON).ok()?;
+    (orbit.period == period).then_some((orbit, observables))
 }

@@ -1,12 +1,13 @@
 //! Figures of one motion: time series with contact shaded, phase portrait, harmonics,
 //! multipliers.
 
-use nanotap_figures::{Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Points};
+use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Points};
 use nanotap_flow::Output;
 
 use crate::figure::panels::{MotionAxes, MotionCurves, OrbitCurves, time_axis};
 use crate::orbit::OrbitReport;
 use crate::simulate::fixed_step::FixedStepRun;
+use crate::simulate::one_shot::OneShot;
 use crate::simulate::{Classification, Simulation};
 use nanotap_case::physical::Kind;
 use nanotap_case::units::Units;
@@ -230,6 +231,35 @@ pub fn orbit_figure(model: &Model, orbit: &OrbitReport, units: &Units) -> Figure
         multipliers: orbit.multipliers.clone(),
     }
     .figure()
+}
+
+/// A run under a signal of one shot: the signal, and the tip with the contacts.
+pub fn one_shot_figure(run: &OneShot, units: &Units) -> Figure {
+    let curves = &run.curves;
+    let size = curves.tip.iter().fold(0.0, |m: f64, p| m.max(p.1.abs()));
+    let (length, unit) = units.axis(Kind::Length, size);
+    let scaled = |curve: &[(f64, f64)]| curve.iter().map(|p| (p.0, length * p.1)).collect();
+    let motion = MotionCurves {
+        axes: MotionAxes {
+            beam: true,
+            length: unit,
+            velocity: String::new(),
+        },
+        contacts: curves.contacts.clone(),
+        surface: scaled(&curves.surface),
+        tip: scaled(&curves.tip),
+        ..MotionCurves::default()
+    };
+    let signal = Line::new(curves.signal.clone()).colour(Colour::GREY);
+    Figure::new(2, 1)
+        .width(DOUBLE_COLUMN)
+        .height(100.0)
+        .with(
+            Panel::new(time_axis(), Axis::linear("drive / its amplitude"))
+                .title(&run.drive_signal)
+                .with(signal),
+        )
+        .with(motion.time_panel())
 }
 
 /// A fixed-step run: time series and phase portrait.

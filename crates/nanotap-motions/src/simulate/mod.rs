@@ -1,6 +1,8 @@
 //! Simulation of a motion: the transient is discarded, the rest recorded, measured and classified.
 
+pub mod drive_signal;
 pub mod fixed_step;
+pub mod one_shot;
 
 pub use nanotap_dynamics::ClassifyOptions;
 use nanotap_dynamics::{
@@ -9,8 +11,9 @@ use nanotap_dynamics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::figure::motion::{fixed_step_figure, simulation_figure};
+use crate::figure::motion::{fixed_step_figure, one_shot_figure, simulation_figure};
 use crate::initial_state::initial_state_note;
+use drive_signal::StatedSignal;
 use fixed_step::{FixedStepRun, fixed_step_run};
 use nanotap_arithmetic::clock::Instant;
 use nanotap_case::Case;
@@ -24,6 +27,7 @@ use nanotap_model::recording::Recording;
 use nanotap_model::{Model, MotionError};
 use nanotap_observe::PhysicalMotion;
 use nanotap_observe::frame::Frame;
+use nanotap_observe::time_series;
 use nanotap_observe::{
     ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record,
 };
@@ -32,6 +36,7 @@ use nanotap_study::in_si::InSi;
 use nanotap_study::limits::{MAX_PERIOD, MAX_PERIODS, MAX_SAMPLES, MAX_STATE_NUMBERS};
 use nanotap_study::request::options;
 use nanotap_study::value::Steps;
+use one_shot::{OneShot, one_shot};
 
 /// Class of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -508,6 +513,11 @@ options! {
         pub steps: Steps = Steps::default(),
         /// For rk4: where within a step the regime is checked
         pub switching: Grid = Grid::default(),
+        /// Signal of one shot in place of the periodic drive: "pulse 5us", "chirp 60kHz 90kHz 5ms",
+        /// "sinc 200kHz 1ms times 40", or a file with the columns time and drive; its 1 is the case's
+        /// drive. Then `periods` counts those after its end
+        #[schemars(extend("x-value" = "SIGNAL"))]
+        pub drive_signal: Option<StatedSignal> = None,
     }
 }
 
@@ -534,6 +544,39 @@ pub enum SimulateReport {
     Exact(Box<InSi<Simulation>>),
     /// Result of fixed time steps, in the model's units.
     FixedStep(Box<FixedStepRun>),
+    /// Result under a signal of one shot, for a physical case also in SI.
+    OneShot(Box<InSi<OneShot>>),
+}
+
+impl SimulateReport {
+    /// Calls `row` for `resolution` equidistant instants in each of the first `periods` drive periods, as
+    /// [`time_series::sample`] does; under a signal of one shot, in all. Fixed time steps have their own
+    /// grid, and no row.
+    ///
+    /// # Errors
+    /// If there would be too many rows, or the flow fails.
+    pub fn sample(
+        &self,
+        case: &Case,
+        options: &SimulateOptions,
+        periods: usize,
+        row: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), Error> {
+        match self {
+            Self::FixedStep(_) => {}
+            Self::Exact(run) => {
+                let (start, periods) = (&run.motion.start, periods.min(run.motion.periods));
+                time_series::sample(&case.model()?, start, periods, options.resolution, row)?;
+            }
+            Self::OneShot(run) => {
+                if let Some(read) = options.signal(case)? {
+                    let start = &run.motion.start;
+                    one_shot::sample(case, &read, start, options.resolution, row)?;
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Study that simulates one motion and classifies it.
@@ -550,7 +593,7 @@ impl Study for SimulateStudy {
     /// sample it as finely as asked.
     fn frames<'a>(case: &Case, report: &'a SimulateReport) -> Vec<Frame<'a>> {
         match report {
-            SimulateReport::Exact(_) => Vec::new(),
+            SimulateReport::Exact(_) | SimulateReport::OneShot(_) => Vec::new(),
             SimulateReport::FixedStep(run) => vec![run.curve_table(case.units())],
         }
     }
@@ -560,6 +603,7 @@ impl Study for SimulateStudy {
         Some(match report {
             SimulateReport::Exact(run) => simulation_figure(&model, &run.motion, &units),
             SimulateReport::FixedStep(run) => fixed_step_figure(&model, run, &units),
+            SimulateReport::OneShot(run) => one_shot_figure(&run.motion, &units),
         })
     }
 
@@ -572,6 +616,12 @@ impl Study for SimulateStudy {
             state: case.state_of(options.state.as_ref())?,
             ..options.clone()
         };
+        if let Some(read) = options.signal(case)? {
+            let motion = one_shot(case, &read, options)?;
+            let resolved = case.physical();
+            let physical = resolved.map(|of| PhysicalMotion::alone(&motion.observables, None, of));
+            return Ok(SimulateReport::OneShot(Box::new(InSi { motion, physical })));
+        }
         let model = case.model()?;
         let given = options.state.is_some();
         if options.method == Method::Rk4 {

@@ -98,6 +98,54 @@ pub struct LeverMotion {
     pub physical: PhysicalMotion,
 }
 
+/// Returns the time constant Q/(π f0) in s of the amplitude of a lever with a resonance at `f0` in Hz.
+pub fn time_constant(quality_factor: f64, f0: f64) -> f64 {
+    quality_factor / (PI * f0)
+}
+
+/// Returns the usual integral gain in 1/s of a feedback loop: half the rate at which the amplitude of a
+/// lever with this time constant in s follows.
+pub fn usual_gain(time_constant: f64) -> f64 {
+    0.5 / time_constant
+}
+
+/// Shortest times in s in which a point of an image can be taken, by what limits them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointTimes {
+    /// Time constant of the amplitude of the lever.
+    pub lever: f64,
+    /// Time in which the integral gain moves the tip by a step. Where the surface falls, the lever is
+    /// free, so that the error is the free amplitude less that of the setpoint.
+    pub gain: f64,
+    /// Time of a step at the slew rate; 0 without a limit.
+    pub slew: f64,
+}
+
+impl PointTimes {
+    /// For steps of `step` in m, an integral gain in 1/s, an error of `error` in m and a slew rate in m/s,
+    /// which may be infinite.
+    pub fn new(time_constant: f64, step: f64, gain: f64, error: f64, slew_rate: f64) -> Self {
+        Self {
+            lever: time_constant,
+            gain: step / (gain * error),
+            slew: step / slew_rate,
+        }
+    }
+
+    /// Returns the longest of the times, s, and the name of its limit: `lever`, `gain` or `slew`.
+    pub fn longest(&self) -> (f64, &'static str) {
+        let times = [(self.gain, "gain"), (self.slew, "slew")];
+        times.into_iter().fold((self.lever, "lever"), |most, time| {
+            if time.0 > most.0 { time } else { most }
+        })
+    }
+
+    /// Returns the largest number of lines a second, there and back, Hz.
+    pub fn line_rate(&self, pixels: usize) -> f64 {
+        1.0 / (2.0 * pixels as f64 * self.longest().0)
+    }
+}
+
 /// Which quality factors levers have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -444,10 +492,28 @@ fn row(lever: String, case: &Case, targets: &[Target], control: &Control<'_>) ->
         quality_factor,
         quality_factor_in_air: None,
         tip_radius: Some(case.get(Key::TipRadius)).filter(|radius| radius.is_finite()),
-        time_constant: quality_factor / (PI * f0),
+        time_constant: time_constant(quality_factor, f0),
         holds: holds(&point, targets, motion.as_ref()),
         motion,
         reason,
         lever,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slowest_part_limits_the_lines() {
+        let lever = time_constant(200.0, 100e3);
+        let times = |step| PointTimes::new(lever, step, usual_gain(lever), 4e-9, f64::INFINITY);
+        // A step of 2 nm takes the integral gain 2 nm / 4 nm of twice the time constant.
+        assert!((times(2e-9).gain / lever - 1.0).abs() < 1e-12);
+        assert_eq!(times(1e-9).longest(), (lever, "lever"));
+        assert_eq!(times(10e-9).longest().1, "gain");
+        assert!((times(1e-9).line_rate(256) - 3.068).abs() < 1e-3);
+        let slow = PointTimes::new(lever, 10e-9, usual_gain(lever), 4e-9, 1e-6);
+        assert_eq!(slow.longest(), (1e-2, "slew"));
     }
 }

@@ -18,5 +18,6 @@ pub mod lever;
 pub mod mode_share;
 pub mod modes;
 pub mod noise;
+pub mod setpoint_map;
 pub mod sweep;
 pub mod window;

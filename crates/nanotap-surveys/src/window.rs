@@ -7,6 +7,9 @@
 //! coming from far and from the nearest distance ([`approach`](nanotap_motions::approach)), and the
 //! orbits of each point are tried at its neighbours, until none gains one. What is found is
 //! certain, what is not found is only not found: more starts see more.
+//!
+//! Of a case that leaves its distance to a setpoint all states at the setpoint are solved at each point
+//! instead ([`setpoint_map`]).
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,22 +18,25 @@ use nanotap_dynamics::{Control, SameMotion};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 
+use crate::setpoint_map::{self, SetpointMap, SetpointMapPlan};
 use crate::sweep::{
-    DISTANCE, FromNeighbour, Starts, Sweep, SweepOptions, Unreached, class_of, from_neighbours,
-    held, target_report, unreached,
+    DISTANCE, FromNeighbour, Over, Starts, Sweep, SweepOptions, Unreached, class_of,
+    from_neighbours, held, points, target_report, unreached,
 };
-use nanotap_case::Case;
+use nanotap_case::physical::Held;
+use nanotap_case::{Case, Key};
 use nanotap_dataset::{Store, StoreError};
 use nanotap_error::Error;
 use nanotap_figures::Figure;
 use nanotap_motions::attractors::MAX_STARTS;
+use nanotap_motions::setpoint::at_setpoint;
 use nanotap_motions::simulate::Classification;
 use nanotap_observe::frame::{Frame, Rows, frame};
 use nanotap_study::DatasetPlan;
 use nanotap_study::DatasetStudy;
 use nanotap_study::limits::MAX_PERIOD;
 use nanotap_study::request::options;
-use nanotap_study::target::{TargetReport, Targets};
+use nanotap_study::target::{TargetPoint, TargetReport, Targets};
 use nanotap_study::value::Axes;
 
 /// Condition of the lever at one point, from the safest to the least safe.
@@ -134,6 +140,10 @@ pub struct Window {
     /// Values at which the setpoint is not reached, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unreached: Vec<Unreached>,
+    /// The states at the setpoint of the case, if it leaves its distance to one; the conditions are then
+    /// those of these states.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setpoint: Option<SetpointMap>,
     /// Where the conditions of `where` hold.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub targets: Option<TargetReport>,
@@ -186,6 +196,11 @@ impl Window {
     pub fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let schema = store.schema();
+        if setpoint_map::is_map(store) {
+            let map = SetpointMap::of(store)?;
+            let conditions = map.conditions(store)?;
+            return Self::with(store, conditions, Vec::new(), Some(map));
+        }
         if schema.grid.axes.len() != 3 {
             return Err(StoreError::NotAStore {
                 path: store.path().into(),
@@ -243,29 +258,52 @@ impl Window {
             .chunks(columns.max(1))
             .map(<[Condition]>::to_vec)
             .collect();
+        Self::with(store, conditions, distances, None)
+    }
+
+    fn with(
+        store: &Store,
+        conditions: Vec<Vec<Condition>>,
+        distances: Vec<Vec<Option<f64>>>,
+        setpoint: Option<SetpointMap>,
+    ) -> Result<Self, StoreError> {
+        let schema = store.schema();
+        let solves = setpoint.is_some() || !distances.is_empty();
+        let all = || conditions.iter().flatten();
+        let total = all().count();
         let shares = Condition::ALL
             .into_iter()
-            .filter(|wanted| *wanted != Condition::Unreached || !distances.is_empty())
+            .filter(|wanted| *wanted != Condition::Unreached || solves)
             .map(|wanted| {
-                let count = conditions
-                    .iter()
-                    .flatten()
-                    .filter(|c| **c == wanted)
-                    .count();
-                (wanted.name(), count as f64 / (rows * columns) as f64)
+                let count = all().filter(|c| **c == wanted).count();
+                (wanted.name(), count as f64 / total as f64)
             })
             .collect();
         Ok(Self {
             parameters: [1, 0].map(|axis| schema.grid.axes[axis].name.clone()),
             x: schema.axis_values(1),
             y: schema.axis_values(0),
-            conditions,
             shares,
+            conditions,
             held: held(store),
             distances,
             unreached: unreached(store),
+            setpoint,
             targets: target_report(store)?,
         })
+    }
+
+    /// Returns the motions found at each point of a finished dataset, row by row, as the conditions of
+    /// `where` are evaluated on them.
+    ///
+    /// # Errors
+    /// As [`Window::of`].
+    pub fn motions(store: &Store) -> Result<Vec<TargetPoint>, StoreError> {
+        store.require_all()?;
+        if setpoint_map::is_map(store) {
+            return setpoint_map::motions(store);
+        }
+        points(store)
     }
 
     /// Evaluates the dataset and stores the window with it in `window.json`.
@@ -339,18 +377,23 @@ options! {
 }
 
 impl WindowOptions {
+    /// The two parameters.
+    fn parameters(&self, case: &Case) -> Result<[Over; 2], Error> {
+        let over = self.over.parse(case)?;
+        <[Over; 2]>::try_from(over).map_err(|over| {
+            Error::input(
+                format!("{} parameters make no window: two are needed", over.len()),
+                "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
+            )
+        })
+    }
+
     /// The census at each point as a sweep.
     ///
     /// # Errors
     /// When there are not two parameters, and as for a sweep.
     pub fn sweep(&self, case: &Case, control: &Control<'_>) -> Result<Sweep, Error> {
-        let count = self.over.0.len();
-        if count != 2 {
-            return Err(Error::input(
-                format!("{count} parameters make no window: two are needed"),
-                "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
-            ));
-        }
+        self.parameters(case)?;
         let options = SweepOptions {
             over: self.over.clone(),
             // What a motion is counts, not its course.
@@ -400,8 +443,8 @@ impl DatasetStudy for WindowStudy {
     type Options = WindowOptions;
     type Report = Window;
 
-    fn solves_distance(options: &WindowOptions) -> bool {
-        options.over.solves_distance()
+    fn solves_distance(_: &WindowOptions) -> bool {
+        true
     }
 
     fn prepare(
@@ -409,7 +452,17 @@ impl DatasetStudy for WindowStudy {
         options: &WindowOptions,
         control: &Control<'_>,
     ) -> Result<DatasetPlan, Error> {
-        Ok(Box::new(options.sweep(case, control)?))
+        let over = options.parameters(case)?;
+        if !case.leaves_distance_to_setpoint() || options.over.solves_distance() {
+            return Ok(Box::new(options.sweep(case, control)?));
+        }
+        let distance = |over: &Over| [Key::GapTip, case.gap_key()].contains(&over.key);
+        let held = case.physical().and_then(|view| view.held);
+        if over.iter().any(distance) || matches!(held, Some(Held::Shift(_))) {
+            let (case, _) = at_setpoint(case.clone(), control)?;
+            return Ok(Box::new(options.sweep(&case, control)?));
+        }
+        Ok(Box::new(SetpointMapPlan::new(case, options, over)?))
     }
 
     fn report(store: &Store) -> Result<Window, StoreError> {

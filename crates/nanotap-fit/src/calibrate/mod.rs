@@ -15,10 +15,13 @@ use afm_thermal::{
     Average, Fluid, ModeFactor, Options, Plan, ReferenceLever, Sensitivity, Spectrum, WelchOptions,
     Window,
 };
+use nanotap_case::input::{self, MAX_TABLE_BYTES, Origin};
 use nanotap_case::table::Table;
 use nanotap_error::Error;
 use nanotap_figures::Figure;
-use nanotap_quantity::number::{shortest, significant};
+use nanotap_observe as observe;
+use nanotap_observe::frame::{Frame, Rows, frame};
+use nanotap_quantity::number::significant;
 use nanotap_quantity::{Dimension, Display, Kind, KindEntry};
 use nanotap_study::request::options;
 use nanotap_study::value::Amount;
@@ -189,59 +192,21 @@ pub struct CalibrateReport {
     pub spectrum: Spectrum,
 }
 
-/// A column of the table of a calibration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SpectrumColumn {
-    /// Name.
-    pub name: &'static str,
-    /// Label of an axis.
-    pub label: &'static str,
-    /// SI unit.
-    pub unit: String,
-    /// A value for each bin.
-    pub values: Vec<f64>,
-}
-
 impl CalibrateReport {
     /// Frequency, density, the density of the fit and their ratio, for all bins of the spectrum.
-    pub fn columns(&self) -> [SpectrumColumn; 4] {
-        let frequency: Vec<f64> = self.spectrum.frequencies().collect();
-        let density: Vec<f64> = self.spectrum.powers().collect();
-        let fit: Vec<f64> = frequency
-            .iter()
-            .map(|f| self.calibration.density(*f))
-            .collect();
-        let ratio = density.iter().zip(&fit).map(|(p, s)| p / s).collect();
-        let unit = format!("{}^2/Hz", self.calibration.unit.symbol());
-        [
-            ("frequency", "frequency", "Hz".to_owned(), frequency),
-            ("density", "power density", unit.clone(), density),
-            ("fit", "fit", unit, fit),
-            ("ratio", "density / fit", String::new(), ratio),
-        ]
-        .map(|(name, label, unit, values)| SpectrumColumn {
-            name,
-            label,
-            unit,
-            values,
-        })
-    }
-
-    /// These columns as a CSV file.
-    pub fn csv(&self) -> String {
-        let columns = self.columns();
-        let head = columns.iter().map(|column| match column.unit.as_str() {
-            "" => column.name.to_owned(),
-            unit => format!("{} ({unit})", column.name),
+    pub fn spectrum_table(&self) -> Frame<'_> {
+        let bins = self.spectrum.frequencies().zip(self.spectrum.powers());
+        let density = observe::Dimension::Unit(match self.calibration.unit {
+            Unit::Volt => "V^2/Hz",
+            Unit::Metre => "m^2/Hz",
         });
-        let mut text = head.collect::<Vec<_>>().join(",");
-        text.push('\n');
-        for row in 0..columns[0].values.len() {
-            let cells = columns.iter().map(|column| shortest(column.values[row]));
-            text.push_str(&cells.collect::<Vec<_>>().join(","));
-            text.push('\n');
+        let fit = |f| self.calibration.density(f);
+        frame! { Rows::new("spectrum", bins, None);
+            "frequency", "frequency", (Frequency, Digits(5)) => |(f, _)| f;
+            "density", "power density", (density, Digits(5)) => |(_, power)| power;
+            "fit", "fit", (density, Digits(5)) => move |(f, _)| fit(f);
+            "ratio", "density / fit", Digits(5) => move |(f, power)| power / fit(f);
         }
-        text
     }
 
     /// The figure.
@@ -255,8 +220,74 @@ impl CalibrateReport {
 /// # Errors
 /// If the file cannot be read, an option is not valid, or no resonance is found.
 pub fn calibrate_file(path: &Path, options: &CalibrateOptions) -> Result<CalibrateReport, Error> {
-    let measurement = source::read(path, options)?;
-    calibrate(measurement, path.display().to_string(), options)
+    let bytes = input::read(path, MAX_TABLE_BYTES, Origin::User)?;
+    calibrate_bytes(&path.display().to_string(), bytes, options)
+}
+
+impl CalibrateReport {
+    /// Returns the estimates as text, one a row: name, value, relative standard error, 95 % interval.
+    pub fn estimates(&self) -> Vec<[String; 4]> {
+        let calibration = &self.calibration;
+        let mut rows = Vec::new();
+        let mut row = |name: &str, estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
+            let [low, high] = estimate.interval.map(shown);
+            let percent = significant(100.0 * estimate.relative_error, 2);
+            rows.push([
+                name.to_owned(),
+                shown(estimate.value),
+                format!("{percent} %"),
+                format!("{low} to {high}"),
+            ]);
+        };
+        let stiffness = |value| Kind::Stiffness.format(value);
+        if let Some(k) = &calibration.stiffness {
+            row("spring constant k", k, &stiffness);
+        }
+        if let Some(k) = &calibration.stiffness_along_normal {
+            row("k along the sample's normal", k, &stiffness);
+        }
+        if let Some(sader) = &calibration.sader {
+            row("k by Sader's method", &sader.stiffness, &stiffness);
+        }
+        row("resonance f0", &calibration.frequency, &|value| {
+            Kind::Frequency.format_digits(value, 6)
+        });
+        row("quality factor Q", &calibration.quality, &|value| {
+            significant(value, 4)
+        });
+        if let Some(sensitivity) = &calibration.sensitivity {
+            row("sensitivity (InvOLS)", sensitivity, &|value| {
+                format!("{} nm/V", significant(1e9 * value, 4))
+            });
+        }
+        let kind = match calibration.unit {
+            Unit::Volt => Kind::Voltage,
+            Unit::Metre => Kind::Length,
+        };
+        // Roots halve the errors.
+        let root = |of: &Estimate| Estimate::new(of.value.sqrt(), 0.5 * of.relative_error);
+        let rms = root(&calibration.mean_square);
+        row("rms of the mode", &rms, &|value| kind.format(value));
+        if let Some(floor) = &calibration.floor {
+            row("noise floor", &root(floor), &|value| {
+                format!("{}/√Hz", kind.format(value))
+            });
+        }
+        rows
+    }
+}
+
+/// Calibrates a lever from the content of such a file with this name.
+///
+/// # Errors
+/// As [`calibrate_file`].
+pub fn calibrate_bytes(
+    name: &str,
+    bytes: Vec<u8>,
+    options: &CalibrateOptions,
+) -> Result<CalibrateReport, Error> {
+    let measurement = source::of_bytes(name, bytes, options)?;
+    calibrate(measurement, name.to_owned(), options)
 }
 
 /// Calibrates a lever from a table with frequency and density, or time and deflection.

@@ -1,10 +1,7 @@
 //! Spectra and records of the deflection, from instruments' files and tables.
 
-use std::path::Path;
-
 use afm_files::{Curve, Document, Format, Limits, Segment, Style, recognise};
 use afm_thermal::{Average, Density, Fluid, Unit};
-use nanotap_case::input::{self, MAX_TABLE_BYTES, Origin};
 use nanotap_case::table::{Entry, Header, Table};
 use nanotap_error::Error;
 use nanotap_quantity::{Kind, Quantity};
@@ -60,16 +57,18 @@ pub(super) struct Measurement {
     pub(super) notes: Vec<String>,
 }
 
-/// Reads a file of an instrument, or a table as text.
-pub(super) fn read(path: &Path, options: &CalibrateOptions) -> Result<Measurement, Error> {
-    let bytes = input::read(path, MAX_TABLE_BYTES, Origin::User)?;
+/// Reads the content of an instrument's file, or of a table as text.
+pub(super) fn of_bytes(
+    name: &str,
+    bytes: Vec<u8>,
+    options: &CalibrateOptions,
+) -> Result<Measurement, Error> {
     if recognise(&bytes).is_none() {
-        drop(bytes);
-        return of_table(&Table::read(path)?, options);
+        return of_table(&Table::of_bytes(name, bytes, None)?, options);
     }
     let refuse = |message: String| {
         Error::input(
-            format!("{}: {message}", path.display()),
+            format!("{name}: {message}"),
             "`nanotap files` lists what a file holds",
         )
     };

@@ -17,12 +17,12 @@ pub fn calibrate_figure(report: &CalibrateReport) -> Figure {
     let margin = 0.15 * (high - low);
     let shown = [(low - margin).max(0.0), high + margin];
     let (factor, unit) = prefixed(Kind::Frequency, 1.0, high);
-    let [frequency, density, _, ratio] = report.columns();
-    let inside = |[low, high]: [f64; 2], values: &[f64]| -> Vec<(f64, f64)> {
-        let points = frequency.values.iter().zip(values);
-        let points: Vec<(f64, f64)> = points
-            .filter(|(f, _)| (low..=high).contains(*f))
-            .map(|(f, value)| (factor * f, *value))
+    let spectrum = &report.spectrum;
+    let inside = |[low, high]: [f64; 2], value: &dyn Fn(f64, f64) -> f64| {
+        let bins = spectrum.frequencies().zip(spectrum.powers());
+        let points: Vec<(f64, f64)> = bins
+            .filter(|(f, _)| (low..=high).contains(f))
+            .map(|(f, power)| (factor * f, value(f, power)))
             .collect();
         averaged(&points)
     };
@@ -36,7 +36,7 @@ pub fn calibrate_figure(report: &CalibrateReport) -> Figure {
     });
     let symbol = report.calibration.unit.symbol();
     let label = format!("power density ({symbol}²/Hz)");
-    let measured = Line::new(inside(shown, &density.values)).colour(Colour::GREY);
+    let measured = Line::new(inside(shown, &|_, power| power)).colour(Colour::GREY);
     let spectrum = Panel::new(axis(), Axis::log(label))
         .legend(Legend::Above)
         .with(measured.width(0.6).label("measured"))
@@ -45,7 +45,8 @@ pub fn calibrate_figure(report: &CalibrateReport) -> Figure {
                 .colour(Colour::VERMILLION)
                 .label("fit"),
         );
-    let ratio = Points::new(inside([low, high], &ratio.values)).colour(Colour::GREY);
+    let ratio = |f, power: f64| power / report.calibration.density(f);
+    let ratio = Points::new(inside([low, high], &ratio)).colour(Colour::GREY);
     let ratio = Panel::new(axis(), Axis::linear("density / fit"))
         .with(ratio)
         .with(Rule::horizontal(1.0));

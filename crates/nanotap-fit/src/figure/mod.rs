@@ -3,3 +3,4 @@
 pub mod calibrate;
 pub mod files;
 pub mod fit;
+pub mod image_states;

@@ -317,21 +317,21 @@ fn leave_out(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec
 
 /// Conversion of a column, from the option `convert`.
 #[derive(Clone, Debug, PartialEq)]
-struct Conversion {
-    name: String,
+pub(crate) struct Conversion {
+    pub(crate) name: String,
     /// Value = `offset` + `factor` · x.
-    factor: f64,
-    offset: f64,
+    pub(crate) factor: f64,
+    pub(crate) offset: f64,
     /// Units from and to, where the rule states them.
     units: Option<[String; 2]>,
     /// New name of the column, if the rule renames it.
-    renamed: Option<String>,
+    pub(crate) renamed: Option<String>,
 }
 
 const RULES: &str = "write NAME=RULE with a rule as in 58 nm/V, 90-x, -x, 1.02*x or amplitude";
 
 impl Conversion {
-    fn parse(text: &str) -> Result<Self, Error> {
+    pub(crate) fn parse(text: &str) -> Result<Self, Error> {
         let wrong = |what: String| Error::option("convert", what, RULES);
         let (name, rule) = text
             .split_once('=')
@@ -394,6 +394,22 @@ impl Conversion {
         }
     }
 
+    /// The unit of converted values that are in `unit`.
+    ///
+    /// # Errors
+    /// When the rule converts another unit; the message begins with the place.
+    pub(crate) fn unit(&self, unit: &str, place: impl FnOnce() -> String) -> Result<String, Error> {
+        match &self.units {
+            Some([from, to]) if unit.is_empty() || unit == *from => Ok(to.clone()),
+            Some([from, _]) => Err(Error::option(
+                "convert",
+                format!("{}: it is in {unit}, the rule converts {from}", place()),
+                format!("write the factor per {unit}"),
+            )),
+            None => Ok(unit.to_owned()),
+        }
+    }
+
     /// Converts the column of `table` that has the name, if one does.
     fn apply(&self, table: &mut Table) -> Result<bool, Error> {
         let place = |name: &str| {
@@ -405,21 +421,7 @@ impl Conversion {
             return Ok(false);
         };
         let header = Header::of(&table.columns[place].0);
-        let unit = match &self.units {
-            Some([from, to]) if header.unit.is_empty() || header.unit == *from => to.clone(),
-            Some([from, _]) => {
-                return Err(Error::option(
-                    "convert",
-                    format!(
-                        "{}: the column is in {}, the rule converts {from}",
-                        table.place(None, place),
-                        header.unit
-                    ),
-                    format!("write the factor per {}", header.unit),
-                ));
-            }
-            None => header.unit,
-        };
+        let unit = self.unit(&header.unit, || table.place(None, place))?;
         let name = self.renamed.as_ref().unwrap_or(&header.name);
         let column = &mut table.columns[place];
         column.0 = written(name, &unit);

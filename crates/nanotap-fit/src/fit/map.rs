@@ -14,6 +14,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
 
+use super::report::quantity;
 use super::{FitOptions, FitReport, FitStudy, fit, names};
 use crate::figure::fit::FitMaps;
 use nanotap_case::Case;
@@ -25,6 +26,7 @@ use nanotap_dataset::{
 };
 use nanotap_error::Error;
 use nanotap_figures::Figure;
+use nanotap_observe::frame::{Frame, Rows, frame};
 use nanotap_study::{Computation, DatasetPlan, DatasetStudy, Study as _};
 
 /// Largest number of pixels of a map.
@@ -110,6 +112,20 @@ pub struct MappedParameter {
 }
 
 impl FitMapReport {
+    /// The free parameters, as readers are shown them.
+    pub fn parameter_table(&self) -> Frame<'_> {
+        let text = |of: &MappedParameter, value: Option<f64>| {
+            value.map_or_else(|| "-".to_owned(), |v| quantity(&of.key, &of.unit, v))
+        };
+        frame! { Rows::new("parameters", &self.parameters, None);
+            "", "parameter", Plain => |of| &of.key;
+            "", "median", Plain => move |of| text(of, of.median);
+            "", "5 % … 95 % of the pixels", Plain =>
+                move |of| of.range.map(|end| text(of, end)).join(" … ");
+            "", "standard error", Plain => move |of| text(of, of.standard_error);
+        }
+    }
+
     fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let schema = store.schema();

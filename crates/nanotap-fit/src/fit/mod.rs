@@ -204,7 +204,11 @@ impl Study for FitStudy {
     type Report = FitReport;
 
     fn frames<'a>(_: &Case, report: &'a FitReport) -> Vec<Frame<'a>> {
-        vec![report.row_table(), report.law_table()]
+        vec![
+            report.row_table(),
+            report.law_table(),
+            report.parameter_table(),
+        ]
     }
 
     fn figure(_: &Case, report: &FitReport) -> Option<Figure> {

@@ -5,8 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use nanotap_case::key::Key;
+use nanotap_case::quantity::Kind;
 use nanotap_motions::approach::Way;
 use nanotap_observe::frame::{Frame, Rows, columns, frame};
+use nanotap_quantity::number::significant;
 
 /// Report of a fit. Values are in SI for a physical case, otherwise in the model's units; phases in
 /// degrees.
@@ -110,7 +113,7 @@ impl FitReport {
         };
         let at = format!("{}{}", self.swept, unit(&self.swept_unit));
         let mut rows = columns! { Rows::new("rows", &self.rows, None);
-            "curve", "curve", Plain => |row| row.curve.replace([',', '"', '\n'], " ");
+            "curve", "curve", Plain => |row| unseparated(&row.curve);
             "line", "line", Plain => |row| row.line as usize;
             at, self.swept.clone(), Digits(5) => |row| row.at;
             "branch", "branch", Plain => |row| row.branch;
@@ -128,6 +131,46 @@ impl FitReport {
         rows.frame()
     }
 
+    /// The free parameters, each with the unit of its numbers in files. A value in brackets is no result:
+    /// the data do not determine it, and it stands where the fit happened to leave it.
+    pub fn parameter_table(&self) -> Frame<'_> {
+        const UNKNOWN: &str = "not determined";
+        let value = |p: &FittedParameter| match (p.text(p.value), p.standard_error) {
+            (value, Some(_)) => value,
+            (value, None) => format!("({value})"),
+        };
+        let interval = |p: &FittedParameter| {
+            let end = |end: Option<f64>| end.map_or_else(|| "?".to_owned(), |end| p.text(end));
+            match p.interval {
+                [None, None] => UNKNOWN.to_owned(),
+                [low, high] => format!("{} to {}", end(low), end(high)),
+            }
+        };
+        let error = |p: &FittedParameter| {
+            p.standard_error
+                .map_or_else(|| UNKNOWN.to_owned(), |error| p.text(error))
+        };
+        frame! { Rows::new("parameters", &self.parameters, None);
+            "", "parameter", Plain => |p| named(&p.key, p.curve.as_deref());
+            .label("key of the case, or correction of a column");
+            "", "value", Plain => value;
+            .align(Right); .label("of the best fit");
+            "", "standard error", Plain => error;
+            .align(Right);
+            "", "95 % interval", Plain => interval;
+            "", "began at", Plain => |p| p.text(p.start);
+            .align(Right); .label("initial value");
+            "key", "", Plain => |p| &p.key; .only_in_files();
+            "curve", "", Plain => |p| p.curve.as_deref().map(unseparated); .only_in_files();
+            "value", "value", Digits(5) => |p| p.value; .only_in_files();
+            "standard_error", "standard error", Digits(5) => |p| p.standard_error; .only_in_files();
+            "low", "lower end of the 95 % interval", Digits(5) => |p| p.interval[0]; .only_in_files();
+            "high", "upper end of the 95 % interval", Digits(5) => |p| p.interval[1]; .only_in_files();
+            "start", "initial value", Digits(5) => |p| p.start; .only_in_files();
+            "unit", "unit of the numbers", Plain => |p| &p.unit; .only_in_files();
+        }
+    }
+
     /// The laws that were compared.
     pub fn law_table(&self) -> Frame<'_> {
         frame! { Rows::new("laws", &self.laws, None);
@@ -140,6 +183,26 @@ impl FitReport {
             "fits", "fits", Plain => |law| if law.fits { "yes" } else { "no" };
             .aligned(Right, Right);
         }
+    }
+}
+
+/// The name of a curve without what separates cells of a file.
+fn unseparated(curve: &str) -> String {
+    curve.replace([',', '"', '\n'], " ")
+}
+
+/// The name of a parameter, with the curve to which alone it applies.
+fn named(key: &str, curve: Option<&str>) -> String {
+    curve.map_or_else(|| key.to_owned(), |curve| format!("{key} of {curve}"))
+}
+
+/// A number of a parameter with its unit, as a reader sees it.
+pub(super) fn quantity(key: &str, unit: &str, value: f64) -> String {
+    let kind = Key::find(key).map(Key::kind);
+    match kind.or_else(|| Kind::of_si_unit(unit)) {
+        Some(kind) => kind.format_digits(value, 5),
+        None if unit == "1" => significant(value, 5),
+        None => format!("{} {unit}", significant(value, 5)),
     }
 }
 
@@ -325,6 +388,13 @@ pub struct FittedParameter {
     pub at_bound: bool,
 }
 
+impl FittedParameter {
+    /// A number of the parameter with its unit, as a reader sees it.
+    pub fn text(&self, value: f64) -> String {
+        quantity(&self.key, &self.unit, value)
+    }
+}
+
 /// Another minimum that describes the data about as well as the best fit.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Rival {
@@ -354,6 +424,24 @@ pub struct RivalParameter {
     pub standard_error: Option<f64>,
     /// Unit of the values in SI, `1` if there is none.
     pub unit: String,
+}
+
+impl RivalParameter {
+    /// The parameter with its value and error, as a reader sees them.
+    pub fn words(&self) -> String {
+        let name = named(&self.key, self.curve.as_deref());
+        let text = |value| quantity(&self.key, &self.unit, value);
+        match self.standard_error {
+            Some(error) => {
+                format!(
+                    "{name} = {} (standard error {})",
+                    text(self.value),
+                    text(error)
+                )
+            }
+            None => format!("{name} not determined"),
+        }
+    }
 }
 
 /// A correction or a term of the instrument that the residuals show and that is not free.

@@ -1,8 +1,5 @@
 //! Heights from a greyscale image.
 
-use std::path::Path;
-
-use nanotap_case::input::{self, MAX_IMAGE_BYTES, Origin};
 use nanotap_error::Error;
 
 /// Most pixels of an image.
@@ -19,15 +16,17 @@ pub(super) struct HeightImage {
 }
 
 impl HeightImage {
-    /// Reads a PNG file, white at `height` and black at 0, stretched over `size`.
+    /// Reads the content of a PNG file, white at `height` and black at 0, stretched over `size`.
     ///
     /// # Errors
-    /// When the file cannot be read, is not a PNG image, or is too large.
-    pub(super) fn read(path: &Path, height: f64, size: [f64; 2]) -> Result<Self, Error> {
-        let name = path.display();
+    /// When it is not a PNG image, or is too large.
+    pub(super) fn read(
+        (name, file): (String, Vec<u8>),
+        height: f64,
+        size: [f64; 2],
+    ) -> Result<Self, Error> {
         let refuse =
             |what: String| Error::input(format!("{name}: {what}"), "name a greyscale image in PNG");
-        let file = input::read(path, MAX_IMAGE_BYTES, Origin::File)?;
         let mut decoder = png::Decoder::new(std::io::Cursor::new(file));
         decoder.set_transformations(png::Transformations::EXPAND);
         let mut reader = decoder

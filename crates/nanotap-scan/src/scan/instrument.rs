@@ -1,11 +1,11 @@
-//! The instrument: lever, lock-in amplifier, controller and scanner, one drive period at a time.
+//! The instrument: lever and electronics, one drive period at a time.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;
 use serde::{Deserialize, Serialize};
 
-use super::feedback::{Controller, LockIn, Scanner};
-use super::options::{Method, Mode};
+use super::electronics::{Electronics, Spot};
+use super::options::Method;
 use super::plan::Plan;
 use super::quasi_static::SteadyLever;
 use super::tapping_period::{Lever, PeriodSignals};
@@ -32,6 +32,16 @@ impl Interaction {
             Self::Attractive
         } else {
             Self::Repulsive
+        }
+    }
+
+    /// The force that governs a period of a lever which `free_force` alone moves by the free
+    /// amplitude.
+    pub(super) fn of(signals: &PeriodSignals, free_force: f64) -> Self {
+        if signals.force.modulus() < FREE * free_force {
+            Self::Free
+        } else {
+            Self::governing(signals)
         }
     }
 }
@@ -66,16 +76,10 @@ enum Levers {
 /// An instrument with its state.
 #[derive(Clone, Debug)]
 pub(super) struct Instrument<'a> {
-    plan: &'a Plan,
     levers: Levers,
     material: usize,
     state: Vec<f64>,
-    lock_in: LockIn,
-    controller: Controller,
-    scanner: Scanner,
-    /// Amplitude of a force at the drive's frequency that alone moves the lever by the free
-    /// amplitude.
-    free_force: f64,
+    electronics: Electronics<'a>,
 }
 
 impl<'a> Instrument<'a> {
@@ -92,7 +96,6 @@ impl<'a> Instrument<'a> {
             first.free_deflection(),
             first.free_force(),
         );
-        let signal = free * plan.length_unit;
         let gap = plan.z0 / plan.length_unit;
         let levers = if plan.method == Method::QuasiStatic {
             let steady = levers
@@ -103,14 +106,10 @@ impl<'a> Instrument<'a> {
             Levers::Moving(levers)
         };
         Ok(Self {
-            plan,
             levers,
             material: 0,
             state,
-            lock_in: LockIn::new(plan.lock_in_part(), plan.lock_in.1, signal),
-            controller: Controller::new(plan.gains, plan.z0),
-            scanner: Scanner::new(plan.z_scanner, plan.period, plan.z0),
-            free_force,
+            electronics: Electronics::new(plan, free, free_force),
         })
     }
 
@@ -136,16 +135,13 @@ impl<'a> Instrument<'a> {
     }
 
     /// Height that the feedback asks for in the next period, m.
-    pub(super) fn height(&self) -> f64 {
-        match self.plan.mode {
-            Mode::ConstantAmplitude => self.controller.command(),
-            Mode::ConstantHeight => self.plan.z0,
-        }
+    pub(super) const fn height(&self) -> f64 {
+        self.electronics.height()
     }
 
     /// Periods whose command was limited by the range of z.
     pub(super) const fn at_range(&self) -> usize {
-        self.controller.at_range
+        self.electronics.at_range()
     }
 
     /// Runs one period above a surface of this height and material.
@@ -158,51 +154,24 @@ impl<'a> Instrument<'a> {
         surface: f64,
         material: usize,
     ) -> Result<Period, Error> {
-        let plan = self.plan;
-        let feeds_back = plan.mode == Mode::ConstantAmplitude;
-        let z = if feeds_back {
-            self.scanner.follow(self.controller.command())
-        } else {
-            plan.z0
+        let spot = Spot {
+            x,
+            surface,
+            material,
         };
-        let gap = (z - surface) / plan.length_unit;
-        let signals = match &mut self.levers {
+        let signals = |gap| match &mut self.levers {
             Levers::Moving(levers) => {
                 let lever = &mut levers[material];
                 if material != self.material {
                     lever.take_over(&mut self.state);
                 }
-                lever.advance(&mut self.state, gap)?
+                lever.advance(&mut self.state, gap)
             }
-            Levers::Steady(levers) => levers[material].at(gap)?,
+            Levers::Steady(levers) => levers[material].at(gap),
         };
+        let period = self.electronics.run_period(spot, signals)?;
         self.material = material;
-        let deflection = signals.deflection * plan.length_unit;
-        let lock_in = self.lock_in.update(deflection);
-        let amplitude = lock_in.modulus();
-        let error = amplitude - plan.setpoint * plan.free_amplitude;
-        if feeds_back {
-            self.controller.update(plan.amplified(amplitude, error));
-        }
-        let interaction = if signals.force.modulus() < FREE * self.free_force {
-            Interaction::Free
-        } else {
-            Interaction::governing(&signals)
-        };
-        Ok(Period {
-            x,
-            material,
-            surface,
-            z,
-            deflection,
-            lock_in,
-            error,
-            peak_force: signals.peak_force * plan.force_unit,
-            mean_deflection: signals.mean_deflection * plan.length_unit,
-            contact: signals.contact,
-            dissipation: signals.dissipation * plan.energy_unit,
-            interaction,
-        })
+        Ok(period)
     }
 }
 

@@ -12,6 +12,8 @@
 //! 4. the controller sets `u_{k+1} = z₀ − (Kp e + s)` with `s` the sum of `Ki T e`, `d` periods
 //!    late, within slew rate and range; `s` stays where the command is limited.
 
+mod averaged;
+mod electronics;
 mod feedback;
 mod frames;
 mod image;
@@ -31,6 +33,7 @@ mod verdict;
 
 use nanotap_dynamics::Control;
 
+pub use averaged::{AveragedLine, averaged_line};
 pub use instrument::Interaction;
 pub use lines::ScanLines;
 pub use options::{Method, Mode, ScanOptions};
@@ -46,6 +49,7 @@ use nanotap_figures::Figure;
 use nanotap_observe::frame::Frame;
 use nanotap_study::Study;
 use plan::Plan;
+pub use plan::material_cases;
 use recorder::LineRecord;
 use run::{Recorded, Settled};
 

@@ -14,6 +14,7 @@ use super::options::{
 };
 use super::profile::{Samples, Surface};
 use nanotap_case::Case;
+use nanotap_case::input::MAX_IMAGE_BYTES;
 use nanotap_case::key::Key;
 use nanotap_case::physical::{Kind, Physical};
 use nanotap_error::Error;
@@ -363,6 +364,20 @@ fn found_distance(case: &Case, setpoint: f64, control: &Control<'_>) -> Result<f
     Ok(found.get(Key::GapTip))
 }
 
+impl ScanOptions {
+    /// Returns the integral gain in 1/s and the slew rate of the z command in m/s, where they are stated.
+    ///
+    /// # Errors
+    /// When one of them is not valid.
+    pub fn feedback_limits(&self) -> Result<[Option<f64>; 2], Error> {
+        let stated = self.integral_gain.is_some() || self.integral_bandwidth.is_some();
+        let gain = stated.then(|| gains(self, 1.0)).transpose()?;
+        let slew = self.slew_rate.as_ref();
+        let slew = slew.map(|rate| rate.si(Kind::Velocity, "slew_rate"));
+        Ok([gain.map(|(integral, _)| integral), slew.transpose()?])
+    }
+}
+
 fn gains(options: &ScanOptions, frequency: f64) -> Result<(f64, Gains), Error> {
     let integral = match (&options.integral_gain, &options.integral_bandwidth) {
         (Some(_), Some(_)) => {
@@ -524,10 +539,19 @@ fn surface(options: &ScanOptions, case: &Case, size: [f64; 2]) -> Result<Surface
     if let Some(name) = &options.image {
         let height = length(options.image_height.as_ref(), "image_height")?
             .ok_or_else(|| missing("image_height", "image_height = \"20 nm\""))?;
-        let image = HeightImage::read(&case.relative_file(name)?, height, size)?;
+        let image = HeightImage::read(case.file(name, MAX_IMAGE_BYTES)?, height, size)?;
         surface = surface.with_image(image);
     }
     Ok(surface)
+}
+
+/// The cases of the materials of a case's `[scan]`: the case itself, then each of `[[scan.material]]` once.
+///
+/// # Errors
+/// When `[scan]` or a material is not valid.
+pub fn material_cases(case: &Case) -> Result<Vec<Case>, Error> {
+    let options = ScanOptions::default().over(case)?;
+    Ok(materials(&options, case)?.0)
 }
 
 /// Cases of the materials and the stretches of the line on which they are.

@@ -1,12 +1,13 @@
 //! The surface under the tip: features, sampled heights, and which material is where.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use super::frames::centres;
 use super::image::HeightImage;
 use super::options::{Feature, MAX_FEATURES, ProfileOptions};
 use nanotap_case::Case;
-use nanotap_case::input::{self, MAX_TABLE_BYTES, Origin};
+use nanotap_case::input::{MAX_TABLE_BYTES, decoded};
 use nanotap_case::physical::Kind;
 use nanotap_error::Error;
 
@@ -248,9 +249,9 @@ impl Samples {
         match profile {
             ProfileOptions::Heights(heights) => Self::evenly(heights.clone(), size),
             ProfileOptions::File(name) => {
-                let path = case.relative_file(name)?;
-                let text = input::text(&path, MAX_TABLE_BYTES, Origin::File)?;
-                Self::parse(&text, &path.display().to_string(), size)
+                let (name, bytes) = case.file(name, MAX_TABLE_BYTES)?;
+                let text = decoded(Path::new(&name), bytes)?;
+                Self::parse(&text, &name, size)
             }
         }
     }

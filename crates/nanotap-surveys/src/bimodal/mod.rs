@@ -231,6 +231,54 @@ impl BimodalReport {
         }
     }
 
+    /// What the usual formulas give at the last distance, and what is exact; `None` without a motion.
+    pub fn formula_table(&self) -> Option<Frame<'_>> {
+        let last = self.table.last()?;
+        let (tones, estimates) = (&last.tones, &last.estimates);
+        let moduli = move |k: usize| self.dynamic_moduli.map(|moduli| moduli[k]);
+        let tangent = move || moduli(0).map(|[storage, loss]| loss / storage);
+        let relaxes = self.dynamic_moduli.is_some();
+        let modulus = if relaxes {
+            "reduced modulus E*, relaxed"
+        } else {
+            "reduced modulus E*"
+        };
+        let unknown = [
+            ("reduced_modulus", estimates.reduced_modulus.is_none()),
+            ("indentation", estimates.indentation.is_none()),
+            ("loss_tangent", estimates.loss_tangent.is_none()),
+            ("storage_modulus_2", !relaxes),
+            ("loss_modulus_2", !relaxes),
+        ];
+        let unknown: Vec<&str> = (unknown.into_iter())
+            .filter_map(|(name, is_unknown)| is_unknown.then_some(name))
+            .collect();
+        let exact = |exact: bool, value, estimate| if exact { value } else { estimate };
+        Some(frame! { Rows::new("formulas", [true, false], None);
+            "source", "", Plain => |of| if of { "exact" } else { "by formula" };
+            "virial_1", "virial, first tone", (Energy, Prefixed(4)) =>
+                move |of| exact(of, tones[0].virial, tones[0].estimates.virial);
+            "E_dis_1", "energy lost a period, first tone", (Energy, Prefixed(4)) =>
+                move |of| exact(of, tones[0].dissipation, tones[0].estimates.dissipation);
+            "virial_2", "virial, second tone", (Energy, Prefixed(4)) =>
+                move |of| exact(of, tones[1].virial, tones[1].estimates.virial);
+            "E_dis_2", "energy lost a period, second tone", (Energy, Prefixed(4)) =>
+                move |of| exact(of, tones[1].dissipation, tones[1].estimates.dissipation);
+            "reduced_modulus", modulus, (Si(Kind::Pressure), Prefixed(4)) =>
+                move |of| if of { self.reduced_modulus } else { estimates.reduced_modulus };
+            "indentation", "indentation", (Length, Prefixed(4)) =>
+                move |of| if of { Some(-last.closest) } else { estimates.indentation };
+            "loss_tangent", "loss tangent, first tone", Prefixed(4) =>
+                move |of| if of { tangent() } else { estimates.loss_tangent };
+            "storage_modulus_2", "storage modulus, second tone", (Si(Kind::Pressure), Prefixed(4)) =>
+                move |of| moduli(1).filter(|_| of).map(|[storage, _]| storage);
+            "loss_modulus_2", "loss modulus, second tone", (Si(Kind::Pressure), Prefixed(4)) =>
+                move |of| moduli(1).filter(|_| of).map(|[_, loss]| loss);
+            .without(&unknown);
+            .turned();
+        })
+    }
+
     /// The motion at each distance. A loop decides which quantities of a tone vary and are shown.
     pub fn point_table(&self) -> Frame<'_> {
         let varying = |k: usize| {
@@ -303,7 +351,9 @@ impl Study for BimodalStudy {
     type Report = BimodalReport;
 
     fn frames<'a>(_: &Case, report: &'a BimodalReport) -> Vec<Frame<'a>> {
-        vec![report.point_table(), report.free_table()]
+        let mut frames = vec![report.point_table(), report.free_table()];
+        frames.extend(report.formula_table());
+        frames
     }
 
     fn figure(_: &Case, report: &BimodalReport) -> Option<Figure> {

@@ -564,7 +564,12 @@ impl GridScale {
     }
 
     /// A map of a number at each point of a grid, row by row.
-    fn heatmap(x: &Self, y: &Self, points: impl Iterator<Item = f64>, scale: Axis) -> Heatmap {
+    pub(crate) fn heatmap(
+        x: &Self,
+        y: &Self,
+        points: impl Iterator<Item = f64>,
+        scale: Axis,
+    ) -> Heatmap {
         let points: Vec<f64> = points.collect();
         let (columns, rows) = (x.cells(), y.cells());
         let width = x.values.len();

@@ -2,6 +2,7 @@
 
 use nanotap_figures::{Colour, Figure, Legend, Line, ONE_AND_A_HALF_COLUMNS, Panel};
 
+use crate::figure::setpoint_map;
 use crate::figure::sweep::{GridAxis, GridScale};
 use crate::window::{Condition, Window};
 use nanotap_dataset::{Store, StoreError};
@@ -25,6 +26,9 @@ const fn colour(condition: Condition) -> Colour {
 /// When a chunk is missing or damaged, or the dataset is not a sweep over two parameters.
 pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     let window = Window::of(store)?;
+    if let Some(map) = &window.setpoint {
+        return Ok(setpoint_map::figure(store, &window, map));
+    }
     let (y, x) = (
         GridAxis::of(store, 0).shown(),
         GridAxis::of(store, 1).shown(),
@@ -67,7 +71,7 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
 }
 
 /// The outline of the points where conditions hold, if they hold anywhere.
-fn outline(targets: &TargetReport, x: &GridScale, y: &GridScale) -> Option<Line> {
+pub(crate) fn outline(targets: &TargetReport, x: &GridScale, y: &GridScale) -> Option<Line> {
     let [left, low] = [x, y].map(GridScale::borders);
     let holds = |row: isize, column: isize| {
         let row = usize::try_from(row)

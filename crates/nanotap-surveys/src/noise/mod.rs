@@ -31,7 +31,7 @@ use nanotap_model::cantilever::Cantilever;
 use nanotap_model::galerkin::Galerkin;
 use nanotap_model::parameter::Parameter;
 use nanotap_motions::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
-use nanotap_observe::frame::Frame;
+use nanotap_observe::frame::{Frame, Rows, frame};
 use nanotap_observe::{Derivative, ObservableSet};
 use nanotap_study::Study;
 use nanotap_study::cantilever;
@@ -104,6 +104,35 @@ pub struct NoiseReport {
     /// Which initial state was followed, and how to list the motions that others lead to.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+}
+
+impl NoiseReport {
+    /// What is read at the working point, and its noise there and of the free lever.
+    pub fn summary_table(&self) -> Frame<'_> {
+        let rows = [
+            ("mean", [self.amplitude, self.phase, self.frequency]),
+            (
+                "rms noise",
+                [self.amplitude_rms, self.phase_rms, self.frequency_rms],
+            ),
+            (
+                "of the free lever",
+                [
+                    self.free_amplitude_rms,
+                    self.free_phase_rms,
+                    self.free_frequency_rms,
+                ],
+            ),
+        ];
+        frame! { Rows::new("summary", rows, None);
+            "statistic", "", Plain => |(name, _)| name;
+            "amplitude", "amplitude A", (Length, Prefixed(4)) => |(_, [amplitude, ..])| amplitude;
+            "phase", "phase lag", (Angle, Digits(4)) => |(_, [_, phase, _])| phase;
+            "frequency", "frequency, A and phase held", (Frequency, Prefixed(4)) =>
+                |(_, [.., frequency])| frequency;
+            .turned();
+        }
+    }
 }
 
 options! {
@@ -190,7 +219,7 @@ impl Study for NoiseStudy {
     type Report = NoiseReport;
 
     fn frames<'a>(_: &Case, report: &'a NoiseReport) -> Vec<Frame<'a>> {
-        vec![report.spectrum.table()]
+        vec![report.spectrum.table(), report.summary_table()]
     }
 
     fn figure(_: &Case, report: &NoiseReport) -> Option<Figure> {

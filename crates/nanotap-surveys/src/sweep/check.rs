@@ -34,12 +34,6 @@ pub(super) fn check(
             over.len()
         ));
     }
-    if over.len() == 2 && over[0].key == over[1].key {
-        return refused(format!(
-            "`{}` is varied twice; vary two different parameters",
-            over[0].key.path()
-        ));
-    }
     for (what, number) in [
         ("0 periods to record", options.periods),
         ("0 starts", starts.count()),
@@ -107,9 +101,19 @@ pub(super) fn model(case: &Case, place: &str) -> Result<Model, Error> {
     })
 }
 
+/// Checks the models at the ends of the ranges, which must be of different parameters.
 /// What a parameter may be is an interval: if the ends of all ranges are right, what lies
 /// between is.
-fn corners(case: &Case, over: &[Over]) -> Result<(), Error> {
+pub(crate) fn corners(case: &Case, over: &[Over]) -> Result<(), Error> {
+    if let [x, y] = over
+        && x.key == y.key
+    {
+        let twice = format!(
+            "`{}` is varied twice; vary two different parameters",
+            x.key.path()
+        );
+        return Err(Error::input(twice, "change {over}"));
+    }
     let ends = |range: &Over| {
         if range.count > 1 {
             vec![0, range.count - 1]

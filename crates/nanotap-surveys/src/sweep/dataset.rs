@@ -61,7 +61,7 @@ pub(crate) const DISTANCE: &str = "distance";
 pub(super) const UNREACHED: &str = "setpoint_unreached";
 
 /// The attribute with what stays while the parameters vary.
-pub(super) const HELD: &str = "held";
+pub(crate) const HELD: &str = "held";
 
 /// What the dataset of a sweep holds.
 pub(super) fn schema(runs: &Runs) -> Result<Schema, Error> {
@@ -246,7 +246,7 @@ fn coordinates(runs: &Runs, lanes: usize, states: Vec<String>) -> Vec<Coordinate
     coordinates
 }
 
-fn parameter(over: &Over) -> Coordinate {
+pub(crate) fn parameter(over: &Over) -> Coordinate {
     let values = Values::Real(over.values());
     let unit = match over.kind {
         QuantityKind::Number => "1",

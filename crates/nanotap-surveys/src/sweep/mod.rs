@@ -33,7 +33,8 @@ mod options;
 mod run;
 mod summary;
 
-pub(crate) use dataset::{DISTANCE, class_of};
+pub(crate) use check::corners;
+pub(crate) use dataset::{DISTANCE, HELD, class_of, parameter};
 pub use follow::Follow;
 pub use nanotap_study::over::{Over, Spacing};
 pub use neighbours::{FromNeighbour, from_neighbours};
@@ -41,7 +42,7 @@ pub use options::{SweepOptions, SweepStudy};
 pub use run::Starts;
 pub use summary::Summary;
 pub use summary::Unreached;
-pub(crate) use summary::{held, target_report, unreached};
+pub(crate) use summary::{held, points, target_report, unreached, write_targets};
 
 use distances::Distances;
 use nanotap_dynamics::Control;

@@ -7,8 +7,7 @@
 //! ([`nanotap_dynamics::share_orbits`]). Where starts of all sizes are drawn at each value, the
 //! states of a slowly moved lever there ([`states_near`]) are tried as well: one approach
 //! serves all distances of a line of values, along which the branches of the orbits that runs
-//! ended on are followed too, and of many lines or values some are chosen, whose
-//! states neighbours lead to in turn. What that finds is stored with the dataset, in
+//! ended on are followed too. What that finds is stored with the dataset, in
 //! `neighbours.json`: the runs stay what they are.
 //!
 //! Fails: where the number of modes varies, or no strobe states were kept, nothing is tried;
@@ -166,7 +165,8 @@ impl Runs {
     }
 
     /// Periods and states of the orbits on which a slowly moved lever may be, and of those on the
-    /// branches of the orbits that runs ended on, at values that are chosen.
+    /// branches of the orbits that runs ended on, at every value: what is found at one must not depend
+    /// on how many others there are.
     fn quasistatic(
         &self,
         shape: &[usize],
@@ -184,18 +184,15 @@ impl Runs {
         let distances: Vec<bool> = distances.collect();
         let columns = shape[0];
         let rows = shape.get(1).copied().unwrap_or(1);
-        // Each choice is a line of values of the distance, or a value.
-        let chosen = |count: usize, most: usize| (0..count).step_by(count.div_ceil(most).max(1));
+        // One approach serves a line of values of the distance.
         let lines: Vec<Vec<usize>> = match distances[..] {
-            [true, ..] => chosen(rows, LINES)
+            [true, ..] => (0..rows)
                 .map(|y| (0..columns).map(|x| y * columns + x).collect())
                 .collect(),
-            [false, true] => chosen(columns, LINES)
+            [false, true] => (0..columns)
                 .map(|x| (0..rows).map(|y| y * columns + x).collect())
                 .collect(),
-            _ => chosen(rows, LINES / 2)
-                .flat_map(|y| chosen(columns, LINES / 2).map(move |x| vec![y * columns + x]))
-                .collect(),
+            _ => (0..columns * rows).map(|k| vec![k]).collect(),
         };
         let found: Vec<(Vec<usize>, Vec<Vec<PeriodicOrbit>>)> = lines
             .into_par_iter()
@@ -278,9 +275,6 @@ impl Runs {
 
 /// Period and state of an orbit on which a run ended.
 type OrbitState = (usize, Vec<f64>);
-
-/// Lines of values of the distance, at most, for each of which an approach is followed.
-const LINES: usize = 16;
 
 /// Drive periods over which a motion that does not repeat is measured.
 const UNREPEATED: usize = 64;

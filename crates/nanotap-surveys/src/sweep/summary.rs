@@ -6,8 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::dataset::{CLASSES, DISTANCE, HELD, UNREACHED, class_of};
+use super::dataset::{CLASSES, DISTANCE, HELD, START, UNREACHED, class_of};
 use super::{FromNeighbour, from_neighbours};
+use crate::setpoint_map;
 use nanotap_case::Key;
 use nanotap_dataset::{Store, StoreError};
 use nanotap_motions::simulate::Classification;
@@ -107,10 +108,9 @@ pub(crate) fn unreached(store: &Store) -> Vec<Unreached> {
 /// The values of each parameter, in the order in which they were given.
 fn parameters(store: &Store) -> Vec<Vec<f64>> {
     let schema = store.schema();
-    let count = schema.grid.axes.len() - 1;
-    (0..count)
-        .rev()
-        .map(|axis| schema.axis_values(axis))
+    let axes = schema.grid.axes.iter().enumerate().rev();
+    axes.filter(|(_, axis)| axis.name != START)
+        .map(|(axis, _)| schema.axis_values(axis))
         .collect()
 }
 
@@ -119,7 +119,7 @@ const TARGETS: &str = "where.json";
 
 /// Stores the conditions with a dataset. They do not belong to what it was computed from, so that
 /// other conditions can be evaluated on the same dataset.
-pub(super) fn write_targets(store: &Store, targets: &[Target]) -> Result<(), StoreError> {
+pub(crate) fn write_targets(store: &Store, targets: &[Target]) -> Result<(), StoreError> {
     if targets.is_empty() && store.read_beside(TARGETS)?.is_none() {
         return Ok(());
     }
@@ -151,11 +151,16 @@ pub(crate) fn target_report(store: &Store) -> Result<Option<TargetReport>, Store
     }
     let axes = parameters(store);
     let axes: Vec<&[f64]> = axes.iter().map(Vec::as_slice).collect();
-    Ok(Some(TargetReport::of(&targets, &points(store)?, &axes)))
+    let points = if setpoint_map::is_map(store) {
+        setpoint_map::motions(store)?
+    } else {
+        points(store)?
+    };
+    Ok(Some(TargetReport::of(&targets, &points, &axes)))
 }
 
 /// The motions at the values of the parameters, the first parameter fastest.
-fn points(store: &Store) -> Result<Vec<TargetPoint>, StoreError> {
+pub(crate) fn points(store: &Store) -> Result<Vec<TargetPoint>, StoreError> {
     let schema = store.schema();
     let parameters = schema.grid.axes.len() - 1;
     let lengths = schema.grid.axes.iter().take(parameters);

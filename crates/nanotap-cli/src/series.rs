@@ -9,26 +9,25 @@ use nanotap::observe::time_series;
 use crate::failure::Failure;
 use crate::{file, number};
 
-/// Writes `periods` drive periods from `start`, `resolution` rows each and the very end. States are
-/// in the model's units.
-pub(crate) fn write(
+/// Writes the rows that `sample` passes to its argument, with the columns of
+/// [`time_series::sample`].
+pub(crate) fn write<E: Into<Failure>>(
     path: &Path,
     model: &Model,
-    start: &[f64],
-    periods: usize,
-    resolution: usize,
     units: &Units,
+    sample: impl FnOnce(&mut dyn FnMut(&[f64])) -> Result<(), E>,
 ) -> Result<(), Failure> {
     let header = time_series::heads(model, units);
     file::write_rows(path, |rows| {
         rows.push(&(header.join(",") + "\n"))?;
         let mut failed = None;
-        time_series::sample(model, start, periods, resolution, |row| {
+        sample(&mut |row| {
             let line = number::row(time_series::scaled(row, units)) + "\n";
             if failed.is_none() {
                 failed = rows.push(&line).err();
             }
-        })?;
+        })
+        .map_err(Into::into)?;
         failed.map_or(Ok(()), Err)
     })
 }

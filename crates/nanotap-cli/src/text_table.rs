@@ -37,12 +37,11 @@ impl Table {
 
     /// Creates the table of these rows of a frame.
     pub(crate) fn of(frame: &Frame<'_>, rows: impl IntoIterator<Item = usize>) -> Self {
-        let columns = frame.shown_columns();
-        let heads: Vec<String> = columns.iter().map(|column| frame.head(column)).collect();
-        let aligned = columns.iter().map(|column| frame.align(column));
-        let mut table = Self::new(heads.iter().map(String::as_str).zip(aligned));
-        for row in rows {
-            table.row(columns.iter().map(|column| frame.text(column, row)));
+        let shown = frame.shown(rows);
+        let heads = shown.heads.iter();
+        let mut table = Self::new(heads.map(|(head, _, align)| (head.as_str(), *align)));
+        for row in shown.rows {
+            table.row(row);
         }
         table
     }
@@ -257,6 +256,29 @@ mod tests {
         assert_eq!(
             table.render(),
             "  α1   0.1   a\n  α4  20     b\n  Ω   -1.25\n"
+        );
+    }
+
+    #[test]
+    fn a_turned_frame_has_a_line_a_column() {
+        let rows = [("mean", 2e-8, 40.0), ("noise", 3e-12, 0.5)];
+        let frame = nanotap::frame::frame! { nanotap::frame::Rows::new("summary", rows, None);
+            "of", "", Plain => |(of, ..)| of;
+            "A", "amplitude", (Length, Prefixed(3)) => |(_, amplitude, _)| amplitude;
+            "phase", "phase", (Angle, Digits(3)) => |(.., phase)| phase;
+            .turned();
+        };
+        // The heads are faint.
+        let text = Table::all(&frame).render();
+        let (heads, lines) = text.split_once('\n').unwrap();
+        assert!(heads.contains("  mean   noise"), "{heads}");
+        assert_eq!(
+            lines,
+            "  amplitude  20 nm  3 pm\n  phase (°)  40.0   0.500\n"
+        );
+        assert_eq!(
+            frame.csv(),
+            "of,A (m),phase (deg)\nmean,2e-8,40\nnoise,3e-12,0.5\n"
         );
     }
 

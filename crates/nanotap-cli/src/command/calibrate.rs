@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::study::calibrate::{
-    CalibrateOptions, CalibrateReport, Calibration, Estimate, Unit, calibrate_file,
-};
+use nanotap::study::calibrate::{CalibrateOptions, CalibrateReport, Calibration, calibrate_file};
 
 use crate::arguments::{OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -38,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let report = calibrate_file(&arguments.file, &options)?;
-    arguments.out.write(|| report.csv())?;
+    arguments.out.write(|| report.spectrum_table().csv())?;
     arguments.plot.draw(|| report.figure())?;
     output.notes(&report.notes);
     for warning in &report.calibration.warnings {
@@ -53,11 +51,7 @@ fn text(report: &CalibrateReport) -> String {
         "{}: thermal calibration of `{}`",
         report.source, report.name
     );
-    let mut text = format!(
-        "{}\n\n{}\n",
-        style::bold(&heading),
-        table(calibration).render()
-    );
+    let mut text = format!("{}\n\n{}\n", style::bold(&heading), table(report).render());
     let mut say = |words: String| text.push_str(&motion::paragraph(&words));
     say(factors(calibration));
     say(format!(
@@ -80,58 +74,15 @@ fn text(report: &CalibrateReport) -> String {
 }
 
 /// The estimates with their 95 % intervals.
-fn table(calibration: &Calibration) -> Table {
+fn table(report: &CalibrateReport) -> Table {
     let mut table = Table::new([
         ("", Align::Left),
         ("estimate", Align::Left),
         ("error", Align::Right),
         ("95 % interval", Align::Left),
     ]);
-    let mut row = |name: &str, estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
-        let [low, high] = estimate.interval;
-        let percent = number::significant(100.0 * estimate.relative_error, 2);
-        table.row([
-            name.to_owned(),
-            shown(estimate.value),
-            format!("{percent} %"),
-            format!("{} to {}", shown(low), shown(high)),
-        ]);
-    };
-    let stiffness = |value: f64| Kind::Stiffness.format(value);
-    let in_volts = calibration.unit == Unit::Volt;
-    if let Some(k) = &calibration.stiffness {
-        row("spring constant k", k, &stiffness);
-    }
-    if let Some(k) = &calibration.stiffness_along_normal {
-        row("k along the sample's normal", k, &stiffness);
-    }
-    if let Some(sader) = &calibration.sader {
-        row("k by Sader's method", &sader.stiffness, &stiffness);
-    }
-    row("resonance f0", &calibration.frequency, &|value| {
-        Kind::Frequency.format_digits(value, 6)
-    });
-    row("quality factor Q", &calibration.quality, &|value| {
-        number::significant(value, 4)
-    });
-    if let Some(sensitivity) = &calibration.sensitivity {
-        row("sensitivity (InvOLS)", sensitivity, &|value| {
-            format!("{} nm/V", number::significant(1e9 * value, 4))
-        });
-    }
-    let kind = if in_volts {
-        Kind::Voltage
-    } else {
-        Kind::Length
-    };
-    // Roots halve the errors.
-    let root = |of: &Estimate| Estimate::new(of.value.sqrt(), 0.5 * of.relative_error);
-    let rms = root(&calibration.mean_square);
-    row("rms of the mode", &rms, &|value| kind.format(value));
-    if let Some(floor) = &calibration.floor {
-        row("noise floor", &root(floor), &|value| {
-            format!("{}/√Hz", kind.format(value))
-        });
+    for row in report.estimates() {
+        table.row(row);
     }
     table
 }

@@ -9,17 +9,16 @@ use nanotap::case::file as case_file;
 use nanotap::case::physical::Held;
 use nanotap::case::physical::force::SampleForce;
 use nanotap::case::physical::{Kind, Physical, Severity};
-use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::{Case, Key};
+use nanotap::frame::Frame;
 use nanotap::model::beam::Modes;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::table::shown_phase;
 use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{
-    CaseReport, SetpointReport, SolvedCase, UnsolvedCase, note_of_several_tones,
+    CaseReport, SetpointReport, SolvedCase, UnsolvedCase, case_tables, note_of_several_tones,
 };
 
 use crate::arguments::CaseArguments;
@@ -87,15 +86,19 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output.warning(&format!("where the lever rests, {beyond}"));
     }
     output.result(&CaseReport::Solved(Box::new(document)), |_| {
-        match (case.cantilever(), case.physical()) {
-            (_, Some(view)) => {
-                let rest = equilibria_table(&equilibria(&case), view);
-                format!("{}{rest}{solved}", physical(case.title(), view, true))
+        match (case.physical(), &case_tables(&case)[..]) {
+            (Some(view), [mapping, rest @ ..]) => {
+                let rest = rest.first();
+                let rest = rest.map_or_else(String::new, |rest| rests(&case, view, rest));
+                let given = physical(case.title(), view, Some(mapping));
+                format!("{given}{rest}{solved}")
             }
-            (Some(numbers), None) => cantilever(case.title(), numbers),
-            (None, None) => case
-                .oscillator()
-                .map_or_else(String::new, |given| oscillator(&case, given)),
+            (_, [numbers, ..]) => match (case.cantilever(), case.oscillator()) {
+                (Some(given), _) => cantilever(case.title(), given, numbers),
+                (None, Some(given)) => oscillator(&case, given, numbers),
+                (None, None) => String::new(),
+            },
+            (_, []) => String::new(),
         }
     })
 }
@@ -111,7 +114,7 @@ fn unsolved(
     remarks(case, output);
     output.result(&CaseReport::Unsolved(Box::new(document)), |_| {
         let view = case.physical();
-        view.map_or_else(String::new, |view| physical(case.title(), view, false))
+        view.map_or_else(String::new, |view| physical(case.title(), view, None))
     })
 }
 
@@ -165,32 +168,7 @@ fn remark(case: &Cantilever, output: &Output) {
     }
 }
 
-fn cantilever(title: &str, case: &Cantilever) -> String {
-    let mut table = Table::new([
-        ("", Align::Left),
-        ("key", Align::Left),
-        ("or", Align::Left),
-        ("value", Align::Point),
-        ("meaning", Align::Left),
-    ]);
-    table.row(["N", "modes", "", &case.modes.to_string(), "beam modes"]);
-    for parameter in case.parameters() {
-        let key = Key::of(parameter);
-        table.row([
-            key.symbol(),
-            key.name(),
-            key.alias().unwrap_or(key.name()),
-            &number::chosen(case.get(parameter)),
-            key.meaning(),
-        ]);
-    }
-    table.row([
-        "",
-        "contact",
-        "",
-        case.contact.name(),
-        case.contact.meaning(),
-    ]);
+fn cantilever(title: &str, case: &Cantilever, numbers: &Frame<'_>) -> String {
     let heading = format!(
         "{title}: a dimensionless cantilever, {}",
         number::counted(case.modes, "mode", "modes")
@@ -210,12 +188,12 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
     format!(
         "{}\n\n{}\n  drive period {formula} = {period}\n",
         style::bold(&heading),
-        table.render()
+        Table::all(numbers).render()
     )
 }
 
-/// The quantities of the case; those that depend on the distance where it is `solved`.
-fn physical(title: &str, view: &Physical, solved: bool) -> String {
+/// The quantities of the case; those that depend on the distance where the `mapping` to numbers is known.
+fn physical(title: &str, view: &Physical, mapping: Option<&Frame<'_>>) -> String {
     let Physical {
         cantilever: case,
         scales,
@@ -254,7 +232,7 @@ fn physical(title: &str, view: &Physical, solved: bool) -> String {
         }
         Some(Held::Amplitude(_)) | None => {}
     }
-    if solved {
+    if mapping.is_some() {
         given.row([
             "g0",
             &Kind::Length.format(scales.length),
@@ -278,33 +256,16 @@ fn physical(title: &str, view: &Physical, solved: bool) -> String {
         }
         Some(force) => force_rows(&mut given, force, view.parameters.get(Parameter::Omega)),
     }
-    let mut mapping = Table::new([
-        ("", Align::Left),
-        ("key", Align::Left),
-        ("value", Align::Point),
-        ("is", Align::Left),
-        ("of", Align::Left),
-        ("", Align::Left),
-    ]);
-    for row in view.mapping() {
-        mapping.row([
-            Key::of(row.parameter).symbol(),
-            row.parameter.name(),
-            &number::significant(row.value, 6),
-            row.formula,
-            row.quantity,
-            &row.kind.format(row.si),
-        ]);
-    }
     let heading = format!(
         "{title}: a physical cantilever, {}",
         number::counted(case.modes, "mode", "modes")
     );
     let heading = style::bold(&heading);
-    if !solved {
-        return format!("{heading}\n\n{}", given.render());
+    let given = format!("{heading}\n\n{}", given.render());
+    match mapping {
+        Some(mapping) => format!("{given}\n{}", Table::all(mapping).render()),
+        None => given,
     }
-    format!("{heading}\n\n{}\n{}", given.render(), mapping.render())
 }
 
 /// The rows of the lever: of a beam, or of the modes that were measured.
@@ -380,31 +341,13 @@ fn static_excess(modes: usize) -> f64 {
 }
 
 /// Where the undriven lever can rest.
-fn equilibria_table(all: &[Equilibrium], view: &Physical) -> String {
-    if all.is_empty() {
-        return String::new();
-    }
-    let mut table = Table::new([
-        ("gap", Align::Right),
-        ("deflection", Align::Right),
-        ("force", Align::Right),
-        ("", Align::Left),
-    ]);
-    for e in all {
-        let stability = if e.stable { "stable" } else { "unstable" };
-        let contact = if e.contact { ", in contact" } else { "" };
-        table.row([
-            Kind::Length.format(e.gap * view.scales.length),
-            Kind::Length.format(e.deflection * view.scales.length),
-            Kind::Force.format(e.force * view.scales.force),
-            format!("{stability}{contact}"),
-        ]);
-    }
+fn rests(case: &Case, view: &Physical, table: &Frame<'_>) -> String {
     let mut text = format!(
         "\n  {}\n{}",
         style::bold("where the lever rests without a drive"),
-        table.render()
+        Table::all(table).render()
     );
+    let all = equilibria(case);
     let drawn_in = |e: &Equilibrium| e.contact && e.deflection < 0.0;
     let mut stable = all.iter().filter(|e| e.stable).peekable();
     if view.cantilever.alpha5 > 0.0 && stable.peek().is_some() && stable.all(drawn_in) {
@@ -486,45 +429,12 @@ fn force_rows(table: &mut Table, force: &SampleForce, frequency: f64) {
 
 /// Every distance at which an orbit is at the setpoint.
 fn setpoint(report: &SetpointReport) -> String {
-    let mut table = Table::new([
-        ("gap.tip", Align::Right),
-        ("period", Align::Right),
-        ("phase (°)", Align::Point),
-        ("E_dis", Align::Right),
-        ("F_max", Align::Right),
-        ("", Align::Left),
-    ]);
-    for s in &report.solutions {
-        let stability = if s.stable { "stable" } else { "unstable" };
-        let reached = if s.reached {
-            ", reached on approach"
-        } else {
-            ""
-        };
-        table.row([
-            Kind::Length.format_digits(s.zc, 5),
-            s.period.to_string(),
-            number::significant(shown_phase(s.observables.phase), 4),
-            format_electronvolts(s.physical.observables.dissipation),
-            Kind::Force.format(s.physical.observables.peak_force),
-            format!("{stability}{reached}"),
-        ]);
-    }
     let heading = format!("where {}", report.held_value());
-    format!("\n  {}\n{}", style::bold(&heading), table.render())
+    let table = Table::all(&report.solution_table()).render();
+    format!("\n  {}\n{table}", style::bold(&heading))
 }
 
-fn oscillator(case: &Case, oscillator: &Oscillator) -> String {
-    let mut table = Table::new([
-        ("", Align::Left),
-        ("key", Align::Left),
-        ("value", Align::Point),
-        ("meaning", Align::Left),
-    ]);
-    for key in case.keys() {
-        let value = number::chosen(case.get(key));
-        table.row([key.symbol(), key.name(), &value, key.meaning()]);
-    }
+fn oscillator(case: &Case, oscillator: &Oscillator, numbers: &Frame<'_>) -> String {
     let what = match oscillator.stop {
         Stop::Soft { .. } => "an oscillator with a soft stop",
         Stop::Rigid { .. } => "an oscillator with a rigid stop",
@@ -532,6 +442,6 @@ fn oscillator(case: &Case, oscillator: &Oscillator) -> String {
     format!(
         "{}\n\n{}",
         style::bold(&format!("{}: {what}", case.title())),
-        table.render()
+        Table::all(numbers).render()
     )
 }

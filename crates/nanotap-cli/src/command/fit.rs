@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nanotap::case::Key;
 use nanotap::case::physical::Kind;
 use nanotap::dataset::Share;
 use nanotap::figure::fit::{FitMaps, fit_figure};
@@ -12,7 +11,7 @@ use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{
     Estimate, FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve,
-    FittedParameter, RivalParameter,
+    RivalParameter,
 };
 use serde::Serialize;
 
@@ -175,28 +174,6 @@ fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Resu
 
 /// A map of fits in short.
 fn map_text(report: &FitMapReport) -> String {
-    let mut table = Table::new([
-        ("parameter", Align::Left),
-        ("median", Align::Left),
-        ("5 % … 95 % of the pixels", Align::Left),
-        ("standard error", Align::Left),
-    ]);
-    for parameter in &report.parameters {
-        let shown = |value: Option<f64>| {
-            let (key, unit) = (&parameter.key, &parameter.unit);
-            value.map_or_else(|| "-".to_owned(), |value| with_unit(key, unit, value))
-        };
-        table.row([
-            parameter.key.clone(),
-            shown(parameter.median),
-            format!(
-                "{} … {}",
-                shown(parameter.range[0]),
-                shown(parameter.range[1])
-            ),
-            shown(parameter.standard_error),
-        ]);
-    }
     format!(
         "{}\n{}",
         motion::paragraph(&format!(
@@ -212,7 +189,7 @@ fn map_text(report: &FitMapReport) -> String {
                 "those described"
             }
         )),
-        table.render()
+        Table::all(&report.parameter_table()).render()
     )
 }
 
@@ -236,23 +213,6 @@ fn of_curve(path: &Path, curve: &str, index: usize) -> PathBuf {
     };
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     path.with_file_name(format!("{}-{name}.toml", stem.unwrap_or_default()))
-}
-
-/// A value of a parameter with its unit.
-fn quantity(parameter: &FittedParameter, value: f64) -> String {
-    with_unit(&parameter.key, &parameter.unit, value)
-}
-
-fn with_unit(key: &str, unit: &str, value: f64) -> String {
-    match Key::find(key) {
-        Some(key) => key.kind().format_digits(value, 5),
-        None => match unit {
-            "m" => nanotap::case::physical::Kind::Length.format_digits(value, 5),
-            "Hz" => nanotap::case::physical::Kind::Frequency.format_digits(value, 5),
-            "1" => number::significant(value, 5),
-            unit => format!("{} {unit}", number::significant(value, 5)),
-        },
-    }
 }
 
 /// The laws that were compared, and what is to be kept in mind.
@@ -398,32 +358,7 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
         }
         text.push_str(&force_curve(of));
     }
-    let mut table = Table::new([
-        ("parameter", Align::Left),
-        ("value", Align::Right),
-        ("standard error", Align::Right),
-        ("95 % interval", Align::Left),
-        ("began at", Align::Right),
-    ]);
-    for p in &report.parameters {
-        let name = match &p.curve {
-            Some(curve) => format!("{} of {curve}", p.key),
-            None => p.key.clone(),
-        };
-        let end = |end: Option<f64>| end.map_or_else(|| "?".to_owned(), |v| quantity(p, v));
-        let interval = match p.interval {
-            [None, None] => "not determined".to_owned(),
-            [low, high] => format!("{} to {}", end(low), end(high)),
-        };
-        // What the data leave open stands where the fit happened to leave it.
-        let value = quantity(p, p.value);
-        let (value, error) = match p.standard_error {
-            Some(error) => (value, quantity(p, error)),
-            None => (format!("({value})"), "not determined".to_owned()),
-        };
-        table.row([name, value, error, interval, quantity(p, p.start)]);
-    }
-    text.push_str(&table.render());
+    text.push_str(&Table::all(&report.parameter_table()).render());
     text.push('\n');
     if report.parameters.iter().any(|p| p.standard_error.is_none()) {
         text.push_str(&motion::paragraph(
@@ -500,21 +435,7 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
 fn rivals(report: &FitReport) -> String {
     let mut text = String::new();
     for rival in &report.rivals {
-        let of = |p: &RivalParameter| {
-            let value = with_unit(&p.key, &p.unit, p.value);
-            let name = match &p.curve {
-                Some(curve) => format!("{} of {curve}", p.key),
-                None => p.key.clone(),
-            };
-            match p.standard_error {
-                Some(error) => {
-                    let error = with_unit(&p.key, &p.unit, error);
-                    format!("{name} = {value} (standard error {error})")
-                }
-                None => format!("{name} not determined"),
-            }
-        };
-        let values: Vec<String> = rival.parameters.iter().map(of).collect();
+        let values: Vec<String> = rival.parameters.iter().map(RivalParameter::words).collect();
         text.push_str(&motion::paragraph(&format!(
             "Another minimum describes the data about as well (Akaike's criterion {:+.1}): {}. {}.",
             rival.above_best,

@@ -16,6 +16,7 @@ mod fit;
 mod fm;
 mod force_curve;
 mod generate;
+mod image_states;
 mod lever;
 mod lyapunov;
 mod merge;
@@ -140,6 +141,8 @@ pub(crate) enum Own {
     Bimodal(bimodal::Arguments),
     /// Simulate a line or an image under feedback
     Scan(scan::Arguments),
+    /// Assign each pixel of an image to a state of the lever, and correct its heights
+    ImageStates(image_states::Arguments),
     /// List what the files of instruments hold
     Files(files::Arguments),
     /// Calibrate a lever from its thermal noise: k, Q, f0, sensitivity
@@ -195,6 +198,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Noise(arguments) => noise::run(arguments, output),
         Own::Bimodal(arguments) => bimodal::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
+        Own::ImageStates(arguments) => image_states::run(arguments, output),
         Own::Files(arguments) => files::run(arguments, output),
         Own::Calibrate(arguments) => calibrate::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
-use crate::text_table::{Align, Table};
+use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
@@ -56,31 +56,6 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
         case.summary(),
         number::chosen(report.temperature)
     );
-    let mut table = Table::new([
-        ("", Align::Left),
-        ("mean", Align::Left),
-        ("rms noise", Align::Left),
-        ("of the free lever", Align::Left),
-    ]);
-    table.row([
-        "amplitude A".to_owned(),
-        length(report.amplitude),
-        length(report.amplitude_rms),
-        length(report.free_amplitude_rms),
-    ]);
-    table.row([
-        "phase lag".to_owned(),
-        degrees(report.phase),
-        degrees(report.phase_rms),
-        degrees(report.free_phase_rms),
-    ]);
-    let hertz = |value| Kind::Frequency.format_digits(value, 4);
-    table.row([
-        "frequency, A and phase held".to_owned(),
-        hertz(report.frequency),
-        hertz(report.frequency_rms),
-        hertz(report.free_frequency_rms),
-    ]);
     let filter = format!(
         "In a lock-in amplifier with a first-order filter of {} (noise bandwidth {}). Without a drive the tip \
          moves by {} rms. The noise of the free lever's phase is that of a force gradient of {}. Frequency \
@@ -120,7 +95,7 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
     format!(
         "{}\n\n{}\n{}",
         style::bold(&heading),
-        table.render(),
+        Table::all(&report.summary_table()).render(),
         [filter, saddle, calibrations]
             .iter()
             .filter(|words| !words.is_empty())

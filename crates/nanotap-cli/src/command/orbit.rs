@@ -63,14 +63,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         ));
     }
     if let Some(path) = &arguments.out.out {
-        series::write(
-            path,
-            &model,
-            &orbit.state,
-            orbit.period,
-            request.resolution,
-            &case.units(),
-        )?;
+        series::write(path, &model, &case.units(), |row| {
+            time_series::sample(&model, &orbit.state, orbit.period, request.resolution, row)
+        })?;
     }
     if let Some(path) = &arguments.harmonics_out {
         let harmonics = harmonic_table(&orbit.spectrum, case.omega(), case.units());

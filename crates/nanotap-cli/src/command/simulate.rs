@@ -6,6 +6,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::study::fixed_step::FixedStepRun;
+use nanotap::study::one_shot::OneShot;
 use nanotap::study::simulate::{
     Classification, SimulateOptions, SimulateReport, SimulateStudy, Simulation,
 };
@@ -23,18 +24,27 @@ use crate::{number, progress, series, style};
 pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let (request, case) = arguments.read(output)?;
+    let (mut request, case) = arguments.read(output)?;
+    if let Some(signal) = &mut request.drive_signal {
+        signal.read_file()?;
+    }
     let model = case.model()?;
     let report = progress::study::<SimulateStudy>(&case, &request, &ThreadsArgument::default())?;
     let units = case.units();
     arguments.draw(&case, &report)?;
+    let fixed = matches!(report, SimulateReport::FixedStep(_));
+    if let Some(path) = arguments.out.out.as_ref().filter(|_| !fixed) {
+        series::write(path, &model, &units, |row| {
+            report.sample(&case, &request, usize::MAX, row)
+        })?;
+    }
     match &report {
+        SimulateReport::OneShot(report) => {
+            let (seen, physical) = (&report.motion.observables, report.physical.as_ref());
+            motion::warn(seen, physical, &report.motion.out_of_range, "", output);
+        }
         SimulateReport::Exact(report) => {
             let run = &report.motion;
-            if let Some(path) = &arguments.out.out {
-                let resolution = request.resolution;
-                series::write(path, &model, &run.start, run.periods, resolution, &units)?;
-            }
             let (seen, physical) = (&run.observables, report.physical.as_ref());
             motion::warn(seen, physical, &run.out_of_range, "", output);
             output.notes(&run.notes);
@@ -50,6 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &report, |report| match report {
         SimulateReport::Exact(run) => text(&case, &model, &run.motion, &request),
         SimulateReport::FixedStep(run) => rk4_text(&case, run),
+        SimulateReport::OneShot(run) => one_shot_text(&case, &run.motion),
     })
 }
 
@@ -122,6 +133,60 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation, request: &SimulateOpt
         number::significant(run.evaluations_per_period, 3),
     )));
     text
+}
+
+fn one_shot_text(case: &GivenCase, run: &OneShot) -> String {
+    let units = case.units();
+    let heading = format!("{}: {}", case.title(), case.summary());
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    let _ = writeln!(text, "  {}", style::bold(&run.drive_signal));
+    text.push_str(&motion::paragraph(&run.evidence));
+    let (seen, shown) = (&run.observables, |kind, value, digits| {
+        number::quantity(&units, kind, value, [digits, 4])
+    });
+    let mut table = Table::new([("", Align::Left); 3]);
+    let mut row = |what: &str, value: String, note: &str| {
+        table.row([what.to_owned(), value, note.to_owned()]);
+    };
+    let range = |kind, low, high| format!("{} … {}", shown(kind, low, 6), shown(kind, high, 6));
+    row(
+        "tip deflection W",
+        range(Kind::Length, seen.tip_min, seen.tip_max),
+        "",
+    );
+    row(
+        "gap",
+        range(Kind::Length, seen.gap_range[0], seen.gap_range[1]),
+        "",
+    );
+    if let Some((first, last)) = run.first_contact.zip(run.last_contact) {
+        let times = format!(
+            "at {} to {} drive periods from the beginning of the signal",
+            number::significant(first, 5),
+            number::significant(last, 5)
+        );
+        row("contacts", run.contacts.to_string(), &times);
+        let greatest = "largest at which a contact begins";
+        row(
+            "impact speed",
+            shown(Kind::Velocity, seen.impact_speed, 5),
+            greatest,
+        );
+        let depth = "largest depth below the surface at rest";
+        row(
+            "indentation",
+            shown(Kind::Length, seen.indentation, 5),
+            depth,
+        );
+    } else {
+        row("contacts", "none".to_owned(), "");
+    }
+    row(
+        "force on the tip",
+        range(Kind::Force, seen.least_force, seen.peak_force),
+        "negative where the sample attracts",
+    );
+    text + "\n" + &table.render()
 }
 
 fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {

@@ -15,6 +15,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::number;
 use crate::output::Output;
+use crate::page::paragraph;
 use crate::request::Request;
 use crate::targets;
 use crate::text_table::Table;
@@ -35,14 +36,21 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
+/// Most points of which the states at the setpoint are printed one by one.
+const SHOWN_POINTS: usize = 36;
+
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let options = arguments.request.read()?;
     let names = options.over.names();
-    let any_distance = options.over.solves_distance();
+    let any_distance = WindowStudy::solves_distance(&options);
     let implied = options.over.first_values();
     let case = GivenCase::with_implied(&arguments.case, &implied, any_distance, output)?;
     let over = options.over.parse(&case)?;
-    let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
+    let mut keys: Vec<Key> = over.iter().map(|over| over.key).collect();
+    if case.leaves_distance_to_setpoint() {
+        // The distance is solved at each point.
+        keys.push(Key::DriveSetpoint);
+    }
     case.note_constants(&keys, output);
     let name = derived_name(
         arguments.case.file.as_deref(),
@@ -71,9 +79,20 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             let targets = window.targets.as_ref();
             let targets = targets.map(|found| targets::text(found, &over));
             let unreached = targets::unreached(&window.unreached, &over);
+            let setpoint = window.setpoint.as_ref().map(|map| {
+                let table = Table::all(&map.point_table());
+                let is_short = map.points.iter().flatten().count() <= SHOWN_POINTS;
+                let table = if is_short {
+                    table.render()
+                } else {
+                    String::new()
+                };
+                format!("{table}{}", paragraph(&map.verdict))
+            });
             format!(
-                "{}{unreached}{}",
+                "{}{}{unreached}{}",
                 Table::all(&window.share_table()).render(),
+                setpoint.unwrap_or_default(),
                 targets.unwrap_or_default()
             )
         })

@@ -58,7 +58,7 @@ setpoint = 0.9
 /// always fast.
 fn long_work(study: &str) -> Option<Vec<&'static str>> {
     Some(match study {
-        "modes" | "noise" | "bimodal" => return None,
+        "modes" | "noise" | "bimodal" | "image-states" => return None,
         "simulate" => vec!["case.toml", "--transient", "100000000"],
         "attractors" => vec!["case.toml", "--starts", "1000000"],
         "branch" => vec![

@@ -11,6 +11,7 @@ mod case;
 mod existing_motions;
 mod experiments;
 mod files;
+mod formulas;
 mod front_page;
 mod instrument_files;
 mod instrument_fits;

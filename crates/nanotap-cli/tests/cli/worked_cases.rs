@@ -164,9 +164,11 @@ fn every_document_has_a_test() {
             "fm-lever-on-polystyrene.md",
             "force-curve.md",
             "force-limit.md",
+            "formula.md",
             "frequency-modulation.md",
             "frequency-sweep.md",
             "gallery.md",
+            "image-states.md",
             "kelvin-probe.md",
             "liquid.md",
             "measured-modes.md",
@@ -175,6 +177,7 @@ fn every_document_has_a_test() {
             "noise.md",
             "nonlinear.md",
             "observables.md",
+            "one-shot.md",
             "orbits.md",
             "period-doubling.md",
             "polymer.md",
@@ -250,7 +253,7 @@ follows! {
     the_theory_of_the_beam: "beam.md", 3 commands, 6 numbers;
     the_theory_of_the_observables: "observables.md", 1 commands, 3 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
-    the_bistable_lever: "bistable.md", 3 commands, 13 numbers;
+    the_bistable_lever: "bistable.md", 4 commands, 17 numbers;
     the_thermal_calibration: "calibrate.md", 2 commands, 10 numbers;
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
@@ -268,7 +271,10 @@ follows! {
     the_limit_of_the_force: "force-limit.md", 6 commands, 29 numbers;
     the_thermal_noise: "noise.md", 3 commands, 13 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
+    the_signals_of_one_shot: "one-shot.md", 2 commands, 9 numbers;
     the_scan: "scan.md", 3 commands, 25 numbers;
+    the_formulas: "formula.md", 12 commands, 22 numbers;
+    the_states_of_an_image: "image-states.md", 2 commands, 12 numbers;
     the_force_table: "table.md", 3 commands, 8 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;

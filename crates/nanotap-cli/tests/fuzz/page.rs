@@ -95,6 +95,11 @@ fn bodies() -> Vec<(&'static str, Value)> {
             "/api/law",
             json!({"case": {"preset": "stiff-lever"}, "set": ["sample.law=dmt"]}),
         ),
+        (
+            "/api/force",
+            json!({"case": {"preset": "stiff-lever", "set": ["sample.law=dmt"]}, "force": "4/3*E*max(-d, 0)^1.5*sqrt(R) - c*v",
+                "parameters": {"c": "1e-9 N s/m"}, "take": true}),
+        ),
         ("/api/attractors", json!({"case": case})),
         ("/api/study", study("resonance", range.clone())),
         ("/api/study", study("diagram", range)),

@@ -3,8 +3,8 @@
 
 pub mod registry;
 
-pub use nanotap_fit::{calibrate, fit};
-pub use nanotap_motions::simulate::fixed_step;
+pub use nanotap_fit::{calibrate, fit, image_states};
+pub use nanotap_motions::simulate::{drive_signal, fixed_step, one_shot};
 pub use nanotap_motions::{
     approach, attractors, branch, event, frequency_modulation, lyapunov, orbit, proof, setpoint,
     simulate, upset,
@@ -16,7 +16,8 @@ pub use nanotap_study::{
     cantilever, in_si, limits, request, start_box, target, threads, value,
 };
 pub use nanotap_surveys::{
-    basin, bimodal, contact_laws, convergence, lever, mode_share, modes, noise, sweep, window,
+    basin, bimodal, contact_laws, convergence, lever, mode_share, modes, noise, setpoint_map,
+    sweep, window,
 };
 
 use registry::StudyEntry;
@@ -41,6 +42,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<noise::NoiseStudy>(),
     StudyEntry::of::<bimodal::BimodalStudy>(),
     StudyEntry::of::<scan::ScanStudy>().or_dataset::<scan::ScanLines>(),
+    StudyEntry::of::<image_states::ImageStatesStudy>(),
     StudyEntry::of::<force_curve::ForceCurveStudy>(),
     StudyEntry::of::<lever::LeverStudy>(),
 ];

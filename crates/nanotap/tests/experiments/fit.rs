@@ -628,6 +628,24 @@ fn undetermined_combinations_are_named() {
     assert!((ratio + 2.0).abs() < 1e-3, "{ratio}");
     assert!(report.parameters[0].standard_error.is_none());
     assert!(report.parameters[2].standard_error.is_some());
+    // What the data leave open is in brackets for readers, and missing in files.
+    let table = report.parameter_table();
+    let shown = table.shown(0..table.rows);
+    let [modulus, _, tangent] = &shown.rows[..] else {
+        panic!("{shown:?}")
+    };
+    assert_eq!(modulus[0], "sample.modulus");
+    assert!(modulus[1].starts_with('(') && modulus[1].ends_with("Pa)"));
+    assert_eq!(modulus[2], "not determined");
+    assert!(!tangent[1].contains('(') && tangent[3].contains(" to "));
+    let csv = table.csv();
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(
+        lines[0],
+        "key,curve,value,standard_error,low,high,start,unit"
+    );
+    assert!(lines[1].starts_with("sample.modulus,,") && lines[1].ends_with(",Pa"));
+    assert_eq!(lines[1].split(',').nth(3), Some(""));
 }
 
 /// Compares derivatives of the residuals with differences of fourth order.

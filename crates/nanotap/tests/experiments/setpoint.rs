@@ -1,12 +1,17 @@
 //! Setpoints solved for the distance.
 
+use std::path::Path;
+
 use nanotap::case::Case;
 use nanotap::case::file::Source;
+use nanotap::case::physical::Catalogue;
 use nanotap::control::Control;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::frequency_modulation::{FrequencyModulationOptions, frequency_modulation};
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap::study::setpoint::{at_setpoint, solve_setpoint};
+use nanotap::study::setpoint::{
+    NearOrbit, SetpointSolution, at_setpoint, orbit_at_setpoint, solve_setpoint,
+};
 use nanotap::study::simulate::{SimulateOptions, simulate};
 
 use crate::approach::{MICA, STIFF, budgets, limited, studied};
@@ -97,6 +102,17 @@ fn the_setpoint_is_reached_in_the_state_from_far() {
     let repulsive = |s: &&nanotap::study::setpoint::SetpointSolution| s.stable && !s.reached;
     let other = report.solutions.iter().find(repulsive).unwrap();
     assert!((other.zc / 8.003e-9 - 1.0).abs() < 1e-4, "{}", other.zc);
+    let table = report.solution_table();
+    let shown = table.shown(0..table.rows);
+    let heads: Vec<&str> = shown.heads.iter().map(|(head, ..)| head.as_str()).collect();
+    assert_eq!(
+        heads,
+        ["gap.tip", "period", "phase (°)", "E_dis", "F_max", ""]
+    );
+    assert_eq!(shown.rows[report.chosen][5], "stable, reached on approach");
+    let csv = table.csv();
+    let heads = "gap.tip (m),period,phase (deg),E_dis (J),F_max (N),stable,reached";
+    assert_eq!(csv.lines().next(), Some(heads));
     let [also] = &report.other_states[..] else {
         panic!("{} other states", report.other_states.len())
     };
@@ -285,4 +301,49 @@ fn a_frequency_shift_is_a_setpoint() {
         "{}",
         error.message()
     );
+}
+
+/// The orbits at a setpoint are those that are followed from another setpoint, stable and unstable.
+#[test]
+fn a_followed_state_is_the_one_at_the_setpoint() {
+    let case = |setpoint: f64| {
+        let words = [format!("drive.setpoint={setpoint}")];
+        let file = Path::new("../../docs/cases/dforce-dmt.toml");
+        Case::load(Some(file), &words, &Catalogue::shared()).unwrap()
+    };
+    let control = Control::default();
+    let mut met = 0;
+    for (from, to) in [(0.8, 0.75), (0.5, 0.6), (0.9, 0.93), (0.3, 0.29)] {
+        let [before, after] =
+            [from, to].map(|setpoint| solve_setpoint(&case(setpoint), &control).unwrap());
+        for solution in &before.solutions {
+            let near = NearOrbit {
+                gap: solution.gap,
+                period: solution.period,
+                state: solution.state.clone(),
+                stable: solution.stable,
+            };
+            let followed = orbit_at_setpoint(&case(to), &near).unwrap();
+            let alike = |other: &&SetpointSolution| {
+                other.stable == followed.stable
+                    && (other.zc - followed.zc).abs() < 1e-9 * followed.zc
+                    && (other.observables.phase - followed.observables.phase).abs() < 1e-6
+            };
+            let found = after.solutions.iter().filter(alike).count();
+            assert_eq!(found, 1, "{from} to {to}: {}", followed.zc);
+            assert!((followed.physical.observables.first_harmonic / 20e-9 - to).abs() < 1e-11);
+            met += 1;
+        }
+    }
+    // Two stable states and one between them at each setpoint.
+    assert_eq!(met, 12);
+    // The attractive state is no orbit near the unstable one.
+    let first = &solve_setpoint(&case(0.8), &control).unwrap().solutions[0];
+    let wrong = NearOrbit {
+        gap: first.gap,
+        period: first.period,
+        state: first.state.clone(),
+        stable: !first.stable,
+    };
+    assert!(orbit_at_setpoint(&case(0.8), &wrong).is_err());
 }

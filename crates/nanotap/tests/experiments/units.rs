@@ -34,7 +34,7 @@ fn request(study: &str) -> Option<Value> {
         "fm" => json!({"points": 3, "from": "25 nm", "to": "19 nm"}),
         "convergence" => json!({"largest": 2}),
         // Their columns are those of the data, and their units are given with them.
-        "fit" | "reconstruct"
+        "fit" | "reconstruct" | "image-states"
         // In SI as a whole.
         | "bimodal" | "force-curve" | "lever" => return None,
         _ => json!({}),

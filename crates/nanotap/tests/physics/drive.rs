@@ -1,16 +1,20 @@
 //! Base and direct actuation, with one tone, two and three.
 
+use std::sync::Arc;
+
 use nanotap::case::Case;
 use nanotap::case::physical::free_response::response_at;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::drive_form::Actuation;
+use nanotap::model::drive_form::{Actuation, FrequencyRatio};
 use nanotap::model::galerkin::Galerkin;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::{ObservableSet, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_dynamics::StroboscopicMap as _;
 use nanotap_flow::{Complex, Flow};
 
 use crate::contact_laws::{on, own_numbers};
@@ -378,5 +382,34 @@ fn intermodulate(third: Option<u32>) {
     for (product, (amplitude, _)) in products.iter().zip(&seen) {
         let product = &product[..2 + usize::from(third.is_some())];
         assert!((line(product).0 - amplitude).abs() < 1e-12, "{product:?}");
+    }
+}
+
+/// Tones that never repeat together: after one period of the first the state is that of the same tones
+/// as multiples of a common frequency, on a sample with spring and damper too.
+#[test]
+fn tones_that_do_not_repeat_move_the_lever_as_those_that_do() {
+    for actuation in Actuation::ALL {
+        let locked = Cantilever {
+            further_tones: vec!["13/10".parse().unwrap()],
+            ..two_tones(actuation)
+        };
+        let unlocked = Cantilever {
+            further_tones: vec![FrequencyRatio::unlocked(1.3)],
+            ..locked.clone()
+        };
+        let [locked, unlocked] = [locked, unlocked].map(|case| Model::cantilever(&case).unwrap());
+        let start = vec![0.02, -0.01, 0.003, 0.1, 0.0, -0.2];
+        let mut flow = Flow::new(Arc::clone(&locked.system));
+        flow.start(&start, 0.0).unwrap();
+        flow.run_until(unlocked.period(), &mut ()).unwrap();
+        let mut expected = start.clone();
+        flow.state(&mut expected);
+        let mut found = start;
+        ModelMap::new(&unlocked).advance(&mut found).unwrap();
+        for (a, b) in found.iter().zip(&expected) {
+            assert!((a - b).abs() < 1e-12, "{actuation}: {found:?} {expected:?}");
+        }
+        assert!(ModelMap::new(&unlocked).advance_by(&mut found, 2).is_err());
     }
 }

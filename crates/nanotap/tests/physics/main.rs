@@ -19,6 +19,7 @@ mod motions;
 mod moving_gap;
 mod moving_surface;
 mod observables;
+mod one_shot;
 mod orbit_derivatives;
 mod references;
 mod short_contacts;

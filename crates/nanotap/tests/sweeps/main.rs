@@ -12,4 +12,5 @@ mod folder;
 mod neighbours;
 mod packing;
 mod physics;
+mod setpoint_map;
 mod setpoints;

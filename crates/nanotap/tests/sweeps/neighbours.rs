@@ -97,3 +97,31 @@ fn a_sweep_continues_orbits_to_neighbouring_values() {
     // A motion that a start reached is not listed again.
     assert!(more.iter().all(|m| m.period != 3 || !met[m.at[0]]));
 }
+
+/// At 10 nm the repulsive state exists in addition to the attractive one, which a start from rest reaches.
+/// Values of the amplitude below 2 nm, at which the tip hardly feels the sample, do not lead to it: the
+/// approach at 10 nm does, however many other values there are.
+#[test]
+fn the_number_of_values_does_not_change_what_is_found_at_one() {
+    let lever = case(include_str!("../../../../docs/cases/bistable-lever.toml"));
+    let last = |amplitudes: &str| {
+        let options = WindowOptions {
+            over: Axes(vec![
+                "gap.tip=9.2nm:9.8nm:3".to_owned(),
+                format!("drive.free_amplitude={amplitudes},10nm"),
+            ]),
+            starts: 1,
+            ..WindowOptions::default()
+        };
+        let sweep = options.sweep(&lever, &Control::default()).unwrap();
+        let folder = Folder::new();
+        let store = Store::create_or_resume(&folder.join("w"), sweep.schema().clone()).unwrap();
+        sweep.compute(&store, &how()).unwrap();
+        Window::of(&store).unwrap().conditions.pop().unwrap()
+    };
+    let many: Vec<String> = (0..17)
+        .map(|k| format!("{:.2}nm", 1.0 + 0.05 * f64::from(k)))
+        .collect();
+    assert_eq!(last("1.8nm"), [Condition::SecondState; 3]);
+    assert_eq!(last(&many.join(",")), [Condition::SecondState; 3]);
+}

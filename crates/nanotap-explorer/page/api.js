@@ -45,6 +45,14 @@ export async function bytes(kind, path, body) {
   return new Blob([answer.bytes], { type: answer.kind });
 }
 
+/** The bytes of a file in base64. */
+export const base64Of = (file) => new Promise((done, failed) => {
+  const reader = new FileReader();
+  reader.addEventListener("load", () => done(reader.result.slice(reader.result.indexOf(",") + 1)));
+  reader.addEventListener("error", () => failed(reader.error));
+  reader.readAsDataURL(file);
+});
+
 /** Saves a file under a name. */
 export function save(blob, name) {
   const link = document.createElement("a");

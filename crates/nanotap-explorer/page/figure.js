@@ -1,6 +1,7 @@
 // Figures in the page: an answer contains their description, which is drawn here in the visible range, read
 // under the pointer and zoomed.
 
+import { local } from "./words.js";
 import { described, layout, paint, part, plain, value } from "./plot.js";
 
 const DRAG = 6;               // pixels beyond which a press is not a click
@@ -8,7 +9,8 @@ const EDGE = 0.01;            // part of a panel by which a pointer may miss it
 const REACH = 14;             // pixels within which a drawn point is named
 const SHARE = 0.86;           // size of letters over that of the page
 const TALLEST = 620;          // height that a figure of a motion keeps to, CSS pixels
-const LOWEST = 330;           // least height of the figure of a study, CSS pixels
+const FITTING = [215, 340];   // least and greatest height of a figure that ends with the window, CSS pixels
+const LOWEST = 330;           // least height of a main figure, CSS pixels
 const seen = new IntersectionObserver((all) => { for (const { target, isIntersecting } of all) { target.inView = isIntersecting; if (isIntersecting) draw(target); } });
 const sized = new ResizeObserver((all) => { for (const { target } of all) if (target.figure && target.clientWidth !== target.wide) { arrange(target); draw(target); } });
 const figures = new Set();
@@ -51,12 +53,15 @@ function arrange(element) {
   const size = SHARE * parseFloat(style.fontSize);
   const pen = element.base.getContext("2d");
   // The main figure ends with the window.
-  const tall = element.id === "study-figure" ? Math.max(LOWEST, innerHeight - element.getBoundingClientRect().top - scrollY - 2.4 * size) : TALLEST;
-  const made = layout(pen, element.figure, wide, size, tall, element.views?.() ?? []);
+  const below = innerHeight - element.getBoundingClientRect().top - scrollY;
+  const fits = element.dataset.fit ? Math.min(FITTING[1], Math.max(FITTING[0], below - 3.6 * size)) : null;
+  const tall = element.highest ? element.highest() : fits ?? (["study-figure", "strips"].includes(element.id) ? Math.max(LOWEST, below - 2.4 * size) : TALLEST);
+  const made = layout(pen, element.figure, wide, size, tall, element.views?.() ?? [], fits !== null);
   Object.assign(element, { wide, size, made, dirty: true });
   const before = element.panels;
   element.panels = made.places.map(({ index, left, top, width, height, x, y, title }) => ({ index, left, top, width, height, x, y, title }));
-  element.style.height = `${made.height}px`;
+  // A lower figure than an empty one is not stretched.
+  element.style.height = element.style.minHeight = `${made.height}px`;
   element.base.setAttribute("aria-label", described(made.places));
   // The cross stays at its place.
   const k = before?.indexOf(element.place?.panel) ?? -1;
@@ -152,7 +157,7 @@ function nearest(element, place) {
 export function words(place) {
   const from = place.point ?? place;
   const said = (axis) => `${plain(place.panel[axis].label)} ${Number(from[axis].toPrecision(6))} ${place.panel[axis].unit}`.trim();
-  return `${from.words ? `${from.words}: ` : ""}${said("x")}, ${said("y")}`;
+  return local(`${from.words ? `${from.words}: ` : ""}${said("x")}, ${said("y")}`);
 }
 
 /** The place moved by a hundredth; without one, the centre of the first panel. */

@@ -3,6 +3,9 @@
 
 import { basis, state, put as state_put, theCase } from "./state.js";
 import { ask, superseded } from "./api.js";
+import { local } from "./words.js";
+import { inField, question, understood } from "./entry.js";
+import { make } from "./element.js";
 
 const form = document.getElementById("knobs");
 const GROUPS = {
@@ -21,12 +24,6 @@ export function follows(motion) { now = motion; }
 
 /** `onChanged(key, finished)` is called when a value changed, `error(refusal, key)` when a law was refused. */
 export function onChange(onChanged, error) { changed = onChanged; refused = error; }
-
-function element(name, properties = {}, ...children) {
-  const made = Object.assign(document.createElement(name), properties);
-  made.append(...children);
-  return made;
-}
 
 /** Shows the keys of a case. Controls are made anew if other keys are stated, and keep the focus. While a
  *  slider moves, or `keep` is true, existing ones only take the new values. */
@@ -51,11 +48,11 @@ function build(keys) {
     const solved = (key) => key.name !== "drive.setpoint" && own.some((other) => other.name === "drive.setpoint" && other.stated);
     const first = name === "more" ? [] : own.filter((key) => (key.stated || ALWAYS.includes(key.name)) && !solved(key));
     const rest = own.filter((key) => !first.includes(key) && !(said(key) && key.value !== ""));
-    const box = element("fieldset", {}, element("legend", { textContent: title }), ...first.map((key) => knob(key, own)));
+    const box = make("fieldset", {}, make("legend", { textContent: title }), ...first.map((key) => knob(key, own)));
     box.dataset.group = name;
     if (rest.length) {
-      const more = element("details", { open: opened.has(name) || (!first.length && name !== "more") },
-        element("summary", { textContent: name === "more" ? "modes, forms, second tone" : `${rest.length} more` }), ...rest.map((key) => knob(key, own)));
+      const more = make("details", { open: opened.has(name) || (!first.length && name !== "more") },
+        make("summary", { textContent: name === "more" ? "modes, forms, second tone" : `${rest.length} more` }), ...rest.map((key) => knob(key, own)));
       more.addEventListener("toggle", () => { if (more.open) opened.add(name); else opened.delete(name); });
       box.append(more);
     }
@@ -70,15 +67,18 @@ function update(keys, keep) {
   for (const key of keys) {
     const field = form.querySelector(`[data-key="${key.name}"]`);
     if (!field) continue;
-    const typing = field === document.activeElement && field.value !== field.dataset.shown && field.value !== state.set[key.name];
-    if (!typing && field.value !== key.value) field.value = key.value;
+    const typing = field === document.activeElement && field.value !== field.dataset.shown && field.value !== shownText(key, state.set[key.name] ?? "");
+    if (!typing && field.value !== shownText(key)) field.value = shownText(key);
     if (!typing) field.dataset.shown = field.value;
     const note = document.getElementById(`${idOf(key.name)}-note`);
-    if (note) note.textContent = key.note ? `. ${key.note}` : "";
+    if (note) note.textContent = key.note ? local(`. ${key.note}`) : "";
     const range = form.querySelector(`[data-slider="${key.name}"]`);
     if (range && key.slider && !range.matches(":active")) range.adjust(key, keep);
   }
 }
+
+/** The text of a key in its field: a number with the decimal sign of the language, a word or a formula as it is. */
+const shownText = (key, text = key.value) => (key.sums || key.choices || key.name === "sample.force" ? text : inField(text));
 
 /** Whether a slider is being moved. */
 export const dragged = () => form.querySelector("[data-slider]:active") !== null;
@@ -88,17 +88,17 @@ const words = (key) => (key.symbol && key.symbol !== key.name ? `${key.symbol}  
 
 function knob(key, own) {
   const id = idOf(key.name);
-  const meaning = element("span", { className: "meaning", id: `${id}-meaning`, textContent: key.meaning });
+  const meaning = make("span", { className: "meaning", id: `${id}-meaning`, textContent: key.meaning });
   const field = key.sums ? summed(key, meaning) : key.choices ? chooser(key, meaning) : typed(key);
   field.id = id;
   field.dataset.key = key.name;
-  field.dataset.shown = key.value;
+  field.dataset.shown = shownText(key);
   field.setAttribute("aria-describedby", meaning.id);
-  const label = element("label", { htmlFor: id, textContent: words(key), title: key.meaning });
-  const box = element("div", { className: "knob" }, label, field);
+  const label = make("label", { htmlFor: id, textContent: words(key), title: key.meaning });
+  const box = make("div", { className: "knob" }, label, field);
   const others = key.stated ? own.filter((other) => key.alternatives.includes(other.name) && (other.value !== "" || other.name === "drive.setpoint")) : [];
   if (others.length) {
-    const ways = element("select", { className: "switch" }, ...[key, ...others].map((one) => new Option(words(one), one.name)));
+    const ways = make("select", { className: "switch" }, ...[key, ...others].map((one) => new Option(words(one), one.name)));
     ways.setAttribute("aria-label", `${words(key)}, or another key for the same`);
     ways.dataset.switch = key.name;
     ways.addEventListener("change", () => {
@@ -116,16 +116,20 @@ function knob(key, own) {
 }
 
 function typed(key) {
-  const field = element("input", { type: "text", value: key.value, placeholder: key.stated ? "" : "not stated" });
-  field.addEventListener("change", () => put(key, field.value.trim(), true));
+  const field = make("input", { type: "text", value: shownText(key), placeholder: key.stated ? "" : "not stated" });
+  field.addEventListener("change", () => {
+    const meant = key.name === "sample.force" ? { text: field.value.trim() } : understood(field.value, key);
+    if (meant.instead) question(field, meant, (text) => put(key, text, true));
+    else put(key, meant.text, true);
+  });
   return field;
 }
 
 function chooser(key, meaning) {
-  const field = element("select");
+  const field = make("select");
   if (key.value === "") field.add(new Option("own values", "", true, true));
   for (const choice of key.choices) {
-    const text = choice.meaning ? `${choice.word}: ${choice.meaning}` : choice.word;
+    const text = choice.meaning ? local(`${choice.word}: ${choice.meaning}`) : choice.word;
     field.add(new Option(text, choice.word, false, choice.word === key.value));
     if (choice.word === key.value && choice.meaning) meaning.textContent = `${key.meaning}: ${choice.meaning}`;
   }
@@ -135,21 +139,21 @@ function chooser(key, meaning) {
 
 /** A choice of one contact law, or a sum of laws with +: the field holds the whole name. */
 function summed(key, meaning) {
-  const field = element("input", { type: "text", value: key.value });
+  const field = make("input", { type: "text", value: key.value });
   const terms = key.value.split("+").map((word) => word.trim()).filter(Boolean);
   const said = key.choices.filter((choice) => terms.includes(choice.word)).map((choice) => choice.meaning);
-  const note = element("span", { id: `${idOf(key.name)}-note`, textContent: key.note ? `. ${key.note}` : "" });
+  const note = make("span", { id: `${idOf(key.name)}-note`, textContent: key.note ? local(`. ${key.note}`) : "" });
   meaning.textContent = said.length ? said.join("; ") : key.meaning;
   meaning.append(note);
   const chosen = (title, take) => {
-    const list = element("select", { className: "law" }, new Option(title, ""), ...key.choices.map((choice) => new Option(choice.word, choice.word)));
+    const list = make("select", { className: "law" }, new Option(title, ""), ...key.choices.map((choice) => new Option(choice.word, choice.word)));
     [...list.options].forEach((option, k) => { if (k) option.title = key.choices[k - 1].meaning; });
     list.setAttribute("aria-label", title);
     list.addEventListener("change", () => { if (list.value) law(key, take(list.value), field); });
     return list;
   };
   field.addEventListener("change", () => law(key, field.value.trim(), field));
-  meaning.append(element("span", { className: "laws" }, chosen("another law …", (word) => word), chosen("add a law …", (word) => `${key.value} + ${word}`)));
+  meaning.append(make("span", { className: "laws" }, chosen("another law …", (word) => word), chosen("add a law …", (word) => `${key.value} + ${word}`)));
   return field;
 }
 
@@ -168,7 +172,7 @@ async function law(key, text, field) {
 }
 
 function slider(key, field) {
-  const range = element("input", { type: "range", min: 0, max: 1000, step: 1 });
+  const range = make("input", { type: "range", min: 0, max: 1000, step: 1 });
   range.setAttribute("aria-label", `${words(key)}, slider`);
   range.dataset.slider = key.name;
   const whole = key.name === "modes";
@@ -184,15 +188,16 @@ function slider(key, field) {
     if (whole) Object.assign(range, { min: from, max: to });
     const v = next.number;
     range.value = whole ? v : 1000 * (log ? Math.log(v / from) / Math.log(to / from) : (v - from) / (to - from));
-    range.setAttribute("aria-valuetext", next.value);
+    range.setAttribute("aria-valuetext", inField(next.value));
   };
   range.adjust(key);
   let dirty = false;
   const move = (finished) => {
     dirty = !finished;
-    field.value = `${Number(value(Number(range.value)).toPrecision(5))}${own.unit ? ` ${own.unit}` : ""}`;
+    const text = `${Number(value(Number(range.value)).toPrecision(5))}${own.unit ? ` ${own.unit}` : ""}`;
+    field.value = inField(text);
     range.setAttribute("aria-valuetext", field.value);
-    put(key, field.value, finished);
+    put(key, text, finished);
   };
   range.addEventListener("input", () => move(false));
   range.addEventListener("change", () => move(true));

@@ -1,11 +1,13 @@
 // The lever in slow motion: the beam's shape from all its modes, the tip, and the indented sample.
 // Heights are drawn to scale; the lever's length is not.
 
+import { local } from "./words.js";
+
 const canvas = document.getElementById("lever");
 const pen = canvas.getContext("2d");
 const clock = document.getElementById("phase");
 const play = document.getElementById("play");
-const speed = document.getElementById("speed");
+const SPEED = 0.32;           // drive periods per second
 let film = null;
 let time = 0;                 // in drive periods
 let before = 0;
@@ -75,14 +77,14 @@ function draw() {
   pen.fillStyle = pen.strokeStyle;
   pen.beginPath(); pen.moveTo(right - 7 * ratio, y(tip)); pen.lineTo(right + 7 * ratio, y(tip)); pen.lineTo(right, y(film.apex[k])); pen.closePath(); pen.fill();
   pen.fillStyle = colour("--ink"); pen.font = `${size}px system-ui`;
-  pen.fillText(`height shown: ${film.scale}; length not to scale`, left, 1.35 * size);
+  pen.fillText(local(`height shown: ${film.scale}; length not to scale`), left, 1.35 * size);
   pen.fillText(touching ? "contact" : "", right - 2 * size, height - 0.5 * size);
   clock.textContent = `drive period ${Math.floor(time % film.periods) + 1} of ${film.periods}, phase ${(360 * (time % 1)).toFixed(0)}°`;
   frames.drawn += 1;
 }
 
 function step(now) {
-  if (moving && film) { time += 10 ** Number(speed.value) * Math.min(0.1, (now - before) / 1000); draw(); }
+  if (moving && film) { time += SPEED * Math.min(0.1, (now - before) / 1000); draw(); }
   before = now;
   requestAnimationFrame(step);
 }

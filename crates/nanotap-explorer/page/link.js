@@ -1,12 +1,14 @@
 // Links that open the present view anywhere. A case from a file is in the link itself: a digit for the form
 // of the link, then the text of the file, deflated (RFC 1951), in base64url.
 
-import { bytes } from "./api.js";
+import { base64Of, bytes } from "./api.js";
 import { encoded, names, state, texts } from "./state.js";
 import { code } from "./qr.js";
+import { t } from "./words.js";
+import { drawn } from "./element.js";
 
 const FORM = "1";
-const MOST_TEXT = 200_000;    // bytes of a case file
+const MOST_TEXT = 1 << 20;    // bytes of a case with its files
 const MARGIN = 4;             // light squares around a QR code
 const $ = (id) => document.getElementById(id);
 
@@ -14,15 +16,15 @@ const results = new Map();    // of reading the cases of links
 
 const through = (bytes, stream) => new Blob([bytes]).stream().pipeThrough(stream);
 
-/** What stands for a text in a link. */
-async function packed(text) {
+/** The code of a text in a link. */
+export async function packed(text) {
   const bytes = new Uint8Array(await new Response(through(text, new CompressionStream("deflate-raw"))).arrayBuffer());
   const letters = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
   return FORM + letters.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
-/** The text of a case in a link; an error if it is damaged. */
-async function unpacked(word) {
+/** The text of a code in a link; an error if it is damaged. */
+export async function unpacked(word) {
   const letters = atob(word.slice(1).replaceAll("-", "+").replaceAll("_", "/"));
   const plain = through(Uint8Array.from(letters, (letter) => letter.charCodeAt(0)), new DecompressionStream("deflate-raw"));
   const decoder = new TextDecoder("utf-8", { fatal: true });
@@ -36,9 +38,12 @@ async function unpacked(word) {
   }
 }
 
-/** Takes a text as a case, if the core reads it. */
-async function take(kind, word, text, name) {
-  await bytes(kind, "/api/export", { case: { text }, format: "toml" });
+/** The text of a case with the files that it names in it, if the core reads it. */
+async function whole(kind, text, files = {}) {
+  return (await bytes(kind, "/api/open", { text, files })).text();
+}
+
+function keep(word, text, name) {
   texts.set(word, text);
   names.set(word, name);
 }
@@ -51,21 +56,26 @@ export function read(word) {
 }
 
 async function first(word) {
-  if (/^\d/.test(word) && word[0] !== FORM) return "This link is of another version of nanotap, and this one cannot read its case.";
+  if (/^\d/.test(word) && word[0] !== FORM) return t("fromLink.newer");
   let text = "";
-  try { text = await unpacked(word); } catch { return "This link is damaged: it contains no case file."; }
-  try { await take(word, word, text, "from a link"); } catch (error) { return `The case of this link is refused: ${error.message}.`; }
+  try { text = await unpacked(word); } catch { return t("fromLink.damaged"); }
+  try { keep(word, await whole(word, text), "from a link"); } catch (error) { return t("fromLink.refused", { reason: error.message }); }
   return "";
 }
 
-/** Reads a case file, and returns what stands for it in a link. */
-export async function open(file) {
-  if (file.size > MOST_TEXT) throw new Error(`${file.name} has ${file.size} bytes; a case file has at most ${MOST_TEXT}`);
-  const text = await file.text();
+/** Reads a case file, and the files that it names, and returns its code in a link. */
+export async function open(files) {
+  const [file, ...others] = [...files].sort((one) => (one.name.toLowerCase().endsWith(".toml") ? -1 : 1));
+  for (const { name, size } of files) if (size > MOST_TEXT) throw new Error(`${name} has ${size} bytes; a case with its files has at most ${MOST_TEXT}`);
+  const beside = await Promise.all(others.map(async (one) => [one.name, { base64: await base64Of(one) }]));
+  const text = await whole("open", await file.text(), Object.fromEntries(beside)).catch((error) => { throw new Error(`${file.name}: ${error.message}`); });
   const word = await packed(text);
-  await take("open", word, text, file.name).catch((error) => { throw new Error(`${file.name}: ${error.message}`); });
+  keep(word, text, file.name);
   return word;
 }
+
+/** The address of the page that others can open. */
+export const home = () => document.querySelector("meta[name=nanotap-page]").content || location.href.replace(/[?#].*$/, "");
 
 /** A link to the present view. The file that a server was started with is in it. */
 async function link(given) {
@@ -74,21 +84,15 @@ async function link(given) {
     const file = await bytes("link", "/api/export", { case: { preset: state.preset }, format: "toml" });
     Object.assign(other, { preset: "", case: await packed(await file.text()) });
   }
-  const own = location.href.replace(/[?#].*$/, "");
-  return `${document.querySelector("meta[name=nanotap-page]").content || own}#${encoded(other)}`;
+  return `${home()}#${encoded(other)}`;
 }
 
 /** A QR code as a picture. */
-function picture(rows) {
-  const make = (name, properties) => {
-    const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-    for (const [key, value] of Object.entries(properties)) made.setAttribute(key, value);
-    return made;
-  };
+export function picture(rows, label = "QR code of the link") {
   const size = rows.length + 2 * MARGIN;
   const dark = rows.flatMap((row, y) => row.map((one, x) => (one ? `M${x + MARGIN} ${y + MARGIN}h1v1h-1z` : "")));
-  const drawing = make("svg", { viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": "QR code of the link", "shape-rendering": "crispEdges" });
-  drawing.append(make("rect", { width: size, height: size, fill: "#fff" }), make("path", { d: dark.join(""), fill: "#000" }));
+  const drawing = drawn("svg", { viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": label, "shape-rendering": "crispEdges" });
+  drawing.append(drawn("rect", { width: size, height: size, fill: "#fff" }), drawn("path", { d: dark.join(""), fill: "#000" }));
   return drawing;
 }
 

@@ -1,32 +1,38 @@
-// The page: controls on the left, the lever and the main figure in the middle, what one wants to know on
-// the right, everything else below.
+// The page: what is set on the left, the chosen view on the right, and the displayed motion in detail below.
 
-import { state, basis, caseText, decode, names, remember, takeBase, texts, theCase } from "./state.js";
+import { state, basis, caseText, chosen, decode, names, remember, takeBase, texts, thatCase, theCase } from "./state.js";
 import { ask, bytes, save, stop, superseded } from "./api.js";
+import { fill, local, other, speak, t } from "./words.js";
+import { make } from "./element.js";
+import * as notice from "./notice.js";
+import * as quick from "./set.js";
+import * as states from "./states.js";
+import * as plan from "./plan.js";
+import * as scan from "./scan.js";
 import * as knobs from "./knobs.js";
 import * as lever from "./lever.js";
 import * as figure from "./figure.js";
 import * as study from "./study.js";
+import * as lecture from "./lecture.js";
 import * as link from "./link.js";
 import * as offline from "./offline.js";
 
 const $ = (id) => document.getElementById(id);
+const FIRST = { "drive.setpoint": "0.8" }; // what the first example holds, as an instrument does
 const BUSY_DELAY = 300;        // milliseconds before the page shows that it computes
 const PATIENCE = 1000;         // milliseconds after which a motion gives way to a newer one
 const OFF = "0: off. Too few steps give motions that the equations do not have.";
-const OTHER = "computed for other values – find all again";
-const CALM = 700;              // milliseconds without a change before coexisting motions of a lever are searched
-const LONG = 10000;            // milliseconds after which that search ends
+const CALM = 700;              // milliseconds without a change before coexisting motions are searched
 const SAME = 1e-4;             // relative difference of amplitudes below which a listed motion is the displayed one
-/** Guided starts: words of the link, address, and what there is to see. */
+/** Guided starts: words of the link, address, and what to look at. */
 const LESSONS = {
-  bistable: ["Two motions at one distance", "preset=dmt",
+  bistable: ["Two motions at one distance", "view=studies&preset=dmt",
     "At 18 nm this lever has two stable motions: “Coexisting motions” lists both. Press the other one. The tip then stops touching, the peak force goes from about 1 nN to zero and the phase from below 90° to above, although no value has changed. Which one an instrument shows depends on its history."],
-  phase: ["Why the phase turns", "preset=dmt&set.gap.tip=24+nm",
+  phase: ["Why the phase turns", "view=studies&preset=dmt&set.gap.tip=24+nm",
     "Far away the phase lags by 90°, at resonance. Move the distance from 24 nm to 19 nm: attraction lowers the resonance and the lag grows to 110°. At 18 nm a run from rest ends in repulsion, which raises the resonance: the lag falls to 68°. The curve of the phase shows both branches, with the present motion on it."],
   doubling: ["Period doubling", "preset=paper&tab=diagram&ran=yes&study.key=omega&study.from=2.4&study.to=3.1",
     "Each dot is the largest deflection in one drive period. Read from right to left: below Ω = 2.91 there are two dots, since the motion repeats only after two drive periods; around 2.6 it is chaotic. Click a dot: the lever above shows that motion."],
-  image: ["A false step in an image", "preset=patch&tab=image&ran=yes",
+  image: ["A false step in an image", "view=studies&preset=patch&tab=image&ran=yes",
     "The sample is flat; between 150 nm and 300 nm a patch attracts the tip less. There the lever jumps from its attractive to its repulsive state and stays, so the height in the image changes although the surface does not, and trace and retrace differ."],
   step: ["What a too coarse time step invents", "preset=paper&steps=80",
     "The equations give a motion of period 1. “Comparison with fixed time steps”, at the bottom, shows what 80 Runge–Kutta steps per period make of it. Try 40, then 400."],
@@ -49,7 +55,7 @@ let steps = 0;                // entries of the history that can be undone
 export function say(error) {
   const message = $("message");
   message.hidden = !error;
-  message.textContent = error?.message ?? "";
+  message.textContent = local(error?.message ?? "");
   knobs.mark(error?.keys ?? []);
 }
 
@@ -64,7 +70,7 @@ export async function refresh() {
   if (underway) return;
   underway = true;
   document.body.dataset.busy = "yes";
-  const busyTimer = setTimeout(() => { $("busy").textContent = "computing …"; stale(true); }, BUSY_DELAY);
+  const busyTimer = setTimeout(() => { $("busy").textContent = t("busy"); stale(true); }, BUSY_DELAY);
   let next = request();
   while (next) {
     const { wish, motion, error } = await next;
@@ -83,14 +89,14 @@ export async function refresh() {
   underway = false;
 }
 
-const follows = () => state.follow === "yes" && displayed !== null && displayed.epoch === epoch;
+const follows = () => state.follow === "yes" && state.view !== "states" && displayed !== null && displayed.epoch === epoch;
 
 /** The motion for the present values, or the reason why there is none. */
 function request() {
   outdated = false;
-  const wish = { case: theCase(), start: state.start, steps: state.steps, ranges: !moving };
+  const wish = { case: thatCase(), start: state.start, steps: state.steps, ranges: !moving };
   if (follows() && caseText() !== displayed.text) Object.assign(wish, { from: displayed.case, start: displayed.start });
-  const asked = { ...wish, epoch, text: caseText(), basis: basis() };
+  const asked = { ...wish, epoch, text: caseText(), basis: basis(), changes: Object.keys(state.set) };
   const patience = setInterval(() => { if (outdated || asked.epoch !== epoch) stop("motion"); }, PATIENCE);
   const answer = ask("motion", "/api/motion", wish);
   return answer.then((motion) => ({ wish: asked, motion }), (error) => ({ wish: asked, error }))
@@ -110,28 +116,43 @@ function show(motion, wish) {
     remember(false);
   }
   stale(false);
-  takeBase(wish.basis, wish.case, motion.keys);
+  motion.keys = atSetpoint(motion.keys);
+  takeBase(wish.basis, { set: wish.changes }, motion.keys);
   knobs.follows(motion.readout);
   knobs.show(motion.keys, moving);
-  $("summary").textContent = `${motion.title}: ${motion.summary}`;
+  quick.show(motion.keys, states.about());
+  plan.show(motion.keys);
+  $("summary").textContent = local(`${motion.title}: ${motion.summary}`);
   figure.put($("portrait"), motion.figure);
   figure.put($("contact"), motion.contact);
   lever.show(motion.film);
   amplitude = motion.observables.find((row) => row.name === "amplitude")?.value;
   table(motion.observables);
   readout(motion);
-  $("remarks").textContent = motion.remarks.join(" · ");
-  $("spurious").textContent = motion.fixed_step?.words ?? OFF;
+  $("remarks").textContent = local(motion.remarks.join(" · "));
+  $("spurious").textContent = local(motion.fixed_step?.words ?? OFF);
   $("fixed").hidden = !motion.fixed_step?.figure;
   if (motion.fixed_step?.figure) figure.put($("fixed"), motion.fixed_step.figure);
   else figure.clear($("fixed"));
   $("command").textContent = motion.command;
   $("python").textContent = motion.python;
+  if (!["studies", "data"].includes(state.view)) return;
   markCensus();
-  clearTimeout(calm);
-  if (motion.distance && !moving && found?.of !== searched() && searching !== searched()) calm = setTimeout(() => census(LONG), CALM);
+  soon();
   if (!moving) study.fill(motion);
   else study.follow(motion);
+}
+
+/** The keys of a case at a setpoint: the motion is one at the distance of the chosen state, but what is stated is
+ *  the setpoint. */
+function atSetpoint(keys) {
+  if (!chosen.set || chosen.of !== caseText()) return keys;
+  const { held } = states.about();
+  const said = state.set["drive.setpoint"] ?? (held?.kind === "amplitude" ? String(held.value) : held?.shown ?? "");
+  const number = Number(said);
+  const of = { "gap.tip": { stated: false }, "gap.beam": { stated: "gap.beam" in state.set } };
+  of["drive.setpoint"] = { stated: true, value: said, number: Number.isFinite(number) ? number : null, unit: "", slider: Number.isFinite(number) ? { from: 0.05, to: 0.995, log: false } : null };
+  return keys.map((key) => ({ ...key, ...of[key.name] }));
 }
 
 /** What one wants to know first. */
@@ -142,11 +163,11 @@ function readout(motion) {
   $("readout").replaceChildren(...lines.flatMap(([name, words, shown]) => {
     const [title, value] = ["dt", "dd"].map((tag) => document.createElement(tag));
     title.textContent = words;
-    value.textContent = shown;
+    value.textContent = local(shown);
     value.dataset.read = name;
     return [title, value];
   }));
-  $("regime").textContent = motion.readout.words;
+  $("regime").textContent = local(motion.readout.words);
 }
 
 /** Values change in place; lines are recreated if the set of observables changes. */
@@ -168,7 +189,7 @@ function table(rows) {
   }
   rows.forEach((row, k) => {
     const value = body.rows[k].cells[1];
-    value.textContent = row.shown;
+    value.textContent = local(row.shown);
     value.dataset.value = row.value;
   });
 }
@@ -176,23 +197,22 @@ function table(rows) {
 /** What the listed motions are of. */
 const searched = () => caseText() + $("unstable").checked;
 
-/** Lists the coexisting motions; after `longest` milliseconds, if given, the search ends. */
-async function census(longest) {
+/** Searches the coexisting motions when the values rest. */
+function soon() {
+  clearTimeout(calm);
+  if (state.view === "studies" && !moving && found?.of !== searched() && searching !== searched()) calm = setTimeout(census, CALM);
+}
+
+/** Lists the coexisting motions. */
+async function census() {
   const list = $("attractors");
   const own = searched();
-  clearTimeout(calm);
   list.replaceChildren();
   found = null;
-  $("bound").textContent = "searching …";
+  $("bound").textContent = t("states.searching");
   searching = own;
-  const end = longest && setTimeout(() => {
-    if (searching !== own) return;
-    stop("census");
-    searching = null;
-    $("bound").textContent = `not finished after ${longest / 1000} s; “Find all” has no such limit`;
-  }, longest);
   try {
-    const answer = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
+    const answer = await ask("census", "/api/attractors", { case: thatCase(), unstable: $("unstable").checked });
     if (searched() !== own) return;
     searching = null;
     found = { of: own, bound: answer.bound, stable: answer.motions.filter((one) => one.stable !== false).length };
@@ -200,7 +220,7 @@ async function census(longest) {
       const item = document.createElement("li");
       const button = document.createElement("button");
       button.type = "button";
-      button.textContent = `${one.words}, ${one.shown}`;
+      button.textContent = local(`${one.words}, ${one.shown}`);
       button.dataset.amplitude = one.amplitude;
       button.addEventListener("click", () => {
         state.start = one.start;
@@ -214,30 +234,32 @@ async function census(longest) {
   } catch (error) {
     if (superseded(error)) return;
     searching = null;
-    $("bound").textContent = error.message;
-  } finally {
-    clearTimeout(end);
+    $("bound").textContent = local(error.message);
   }
+}
+
+/** Ends the search of coexisting motions. */
+function noCensus() {
+  clearTimeout(calm);
+  stop("census");
+  if (searching) $("bound").textContent = "";
+  searching = null;
 }
 
 /** The listed motions belong to one case only; a search for those of another one ends. */
 function markCensus() {
-  if (searching !== null && searching !== searched()) {
-    searching = null;
-    stop("census");
-    $("bound").textContent = "the values changed: find all again";
-  }
-  $("states").textContent = "";
+  if (searching !== null && searching !== searched()) noCensus();
+  $("states-here").textContent = "";
   if (!found) return;
   const other = searched() !== found.of;
-  if (!other && found.stable > 1) $("states").textContent = `${found.stable} stable motions coexist here: one click each, below.`;
+  if (!other && found.stable > 1) $("states-here").textContent = `${found.stable} stable motions coexist here: one click each, below.`;
   $("attractors").classList.toggle("stale", other);
   for (const button of $("attractors").querySelectorAll("button")) {
     const own = Number(button.dataset.amplitude);
     button.disabled = other;
     button.setAttribute("aria-pressed", String(!other && Math.abs(own - amplitude) <= SAME * own));
   }
-  $("bound").textContent = other ? OTHER : found.bound;
+  $("bound").textContent = other ? t("states.ofFormer") : local(found.bound);
 }
 
 /** Another motion than one that continues the displayed one. */
@@ -252,21 +274,21 @@ function remembered() {
 }
 
 async function exported(format) {
-  const blob = await bytes("export", "/api/export", { case: theCase(), start: state.start, views: motionViews(), figure: $("which").value, format });
+  const blob = await bytes("export", "/api/export", { case: thatCase(), start: state.start, views: motionViews(), figure: $("which").value, format });
   save(blob, format === "toml" ? "case.toml" : format === "csv" ? "motion.csv" : `${$("which").value}.${format}`);
 }
 
 /** Another case, without changes: one of the list, or an opened file. */
 function fresh(name) {
   const chosen = texts.has(name) ? { preset: "", case: name } : { preset: name, case: "" };
-  Object.assign(state, { ...chosen, set: {}, start: "", study: {}, ran: "", views: {}, lesson: "" });
+  Object.assign(state, { ...chosen, set: {}, start: "", compare: "", study: {}, ran: "", views: {}, lesson: "" });
   remembered();
   takeOver();
 }
 
-async function openFile(file) {
+async function openFiles(files) {
   try {
-    if (file) fresh(await link.open(file));
+    if (files.length) fresh(await link.open(files));
   } catch (error) { if (!superseded(error)) say(error); }
 }
 
@@ -280,42 +302,102 @@ function list() {
 
 async function takeOver() {
   const address = location.hash;
-  const wrong = await link.read(new URLSearchParams(address.slice(1)).get("case"));
+  let wrong = await link.read(new URLSearchParams(address.slice(1)).get("case"));
   if (address !== location.hash) return;
   const before = basis();
   decode(wrong ? "" : address);
   if (state.case) state.preset = "";
-  else if (!about.presets.some((p) => p.name === state.preset)) state.preset = about.presets[0].name;
+  else if (!about.presets.some((p) => p.name === state.preset)) {
+    if (state.preset && !wrong) wrong = t("fromLink.unknown", { version: about.version, name: state.preset });
+    state.preset = about.presets[0].name;
+    // The first example answers the first question: the states at a setpoint.
+    if (about.presets[0].name !== "file") state.set = { ...FIRST, ...state.set };
+  }
   if (basis() !== before) found = null;
+  Object.assign(chosen, { row: null, of: "", set: null });
   list();
+  tongue();
   $("steps").value = state.steps;
   $("follow").checked = state.follow === "yes";
-  $("note").textContent = wrong && `${wrong} The page shows its first case.`;
+  $("note").textContent = wrong && `${wrong} ${t("fromLink.first")}`;
   const lesson = LESSONS[state.lesson];
   $("lesson").hidden = !lesson;
-  $("lesson").firstElementChild.textContent = lesson ? `${lesson[0]}. ${lesson[2]}` : "";
+  $("lesson").firstElementChild.textContent = lesson ? local(`${lesson[0]}. ${lesson[2]}`) : "";
   if (!found) { $("attractors").replaceChildren(); $("bound").textContent = ""; }
+  notice.tell("");
+  if (lecture.wanted()) { lecture.open(); return; }
+  lecture.close(true);
+  enter();
+}
+
+const VIEWS = {
+  states: { enter: () => states.enter(), leave: () => states.leave(), changed: (finished) => states.changed(finished) },
+  plan: { enter: () => { plan.enter(); elsewhere(); }, leave: () => plan.leave(), changed: (finished) => { plan.changed(finished); refresh(); } },
+  scan: { enter: () => { scan.enter(); elsewhere(); }, leave: () => scan.leave(), changed: (finished) => { scan.changed(); if (finished) refresh(); } },
+  data: { enter: () => bench("data"), leave: () => {}, changed: () => refresh() },
+  studies: { enter: () => bench("studies"), leave: noCensus, changed: () => { markCensus(); refresh(); } },
+};
+
+/** Puts the form and figure of the studies into the view of all studies or that of measured data. */
+function bench(view) {
+  if (view === "data") { state.tab = "data"; $("view-data").append($("study")); } else $("middle").append($("study"));
+  $("tabs").hidden = view === "data";
   markCensus();
   study.restore();
   elsewhere();
 }
+let entered = "";
+
+/** Shows the view of the state. */
+function enter() {
+  if (!(state.view in VIEWS)) state.view = "states";
+  if (entered && entered !== state.view) VIEWS[entered].leave();
+  entered = state.view;
+  document.body.dataset.view = entered;
+  for (const name of Object.keys(VIEWS)) $(`view-${name}`).hidden = name !== entered;
+  for (const button of $("views").children) {
+    if (button.dataset.view === entered) button.setAttribute("aria-current", "page"); else button.removeAttribute("aria-current");
+  }
+  if (entered === "studies") $("all").open = true;
+  $("detail").hidden = !["states", "studies"].includes(entered);
+  $("detail").open = entered === "studies" || detailed;
+  VIEWS[entered].enter();
+}
+
+let detailed = false;         // the details of a state are opened
+
+/** Puts the words of the chosen language into the page. */
+function tongue() {
+  speak(state.lang || (navigator.language ?? "en").slice(0, 2));
+  fill();
+  document.title = t("title");
+  for (const button of $("views").children) button.textContent = t(`views.${button.dataset.view}`);
+  for (const option of $("preset").options) option.textContent = t("presets")[option.value] ?? option.textContent;
+}
 
 async function begin() {
-  $("busy").textContent = "loading …";
+  tongue();
+  $("busy").textContent = t("loading");
   try {
     about = await ask("about", "/api/about");
   } catch (error) { say(error); return; } finally { $("busy").textContent = ""; }
-  document.title = `nanotap explorer ${about.version}`;
+  $("lead").title = `nanotap ${about.version}`;
+  $("views").replaceChildren(...Object.keys(VIEWS).map((name) => {
+    const button = make("button", { type: "button" });
+    button.dataset.view = name;
+    button.addEventListener("click", () => { if (state.view === name) return; state.view = name; remembered(); enter(); });
+    return button;
+  }));
   const groups = new Map();
   for (const preset of about.presets) {
-    if (!groups.has(preset.group)) groups.set(preset.group, Object.assign(document.createElement("optgroup"), { label: preset.group }));
-    groups.get(preset.group).append(new Option(preset.words, preset.name));
+    if (!groups.has(preset.group)) groups.set(preset.group, make("optgroup", { label: t("groups")[preset.group] ?? preset.group }));
+    groups.get(preset.group).append(new Option(t("presets")[preset.name] ?? preset.words, preset.name));
   }
-  const yours = Object.assign(document.createElement("optgroup"), { id: "yours", label: "Opened files" });
-  $("preset").append(yours, ...groups.values(), new Option("Open a case file …", OPEN));
+  const yours = make("optgroup", { id: "yours", label: t("opened") });
+  $("preset").append(yours, ...groups.values(), new Option(t("openFile"), OPEN));
   $("lessons").append(...Object.entries(LESSONS).map(([name, [words, address]]) => {
     const item = document.createElement("li");
-    item.append(Object.assign(document.createElement("a"), { href: `#${address}&lesson=${name}`, textContent: words }));
+    item.append(make("a", { href: `#${address}&lesson=${name}`, textContent: words }));
     return item;
   }));
   $("lessons").addEventListener("click", () => { $("learn").open = false; });
@@ -325,20 +407,30 @@ async function begin() {
     list();
     $("open").click();
   });
-  $("open").addEventListener("change", () => openFile($("open").files[0]));
+  $("open").addEventListener("change", () => openFiles($("open").files));
   $("reset").addEventListener("click", () => fresh(basis()));
   $("undo").addEventListener("click", () => { steps -= 1; $("undo").disabled = steps <= 0; history.back(); });
-  knobs.onChange((_, finished, note) => {
+  const onChange = (_, finished, note) => {
     moving = !finished;
-    if (note !== undefined) $("note").textContent = note;
+    if (note !== undefined) $("note").textContent = local(note);
     // While a slider moves, the address is not changed.
     if (finished) remembered();
-    markCensus();
-    refresh();
-  }, (error) => say(error));
+    VIEWS[entered].changed(finished);
+  };
+  knobs.onChange(onChange, say);
+  quick.begin(onChange, say);
+  notice.begin();
+  lecture.begin(() => { if (entered) VIEWS[entered].leave(); }, enter);
+  $("lecture").addEventListener("click", () => { state.lesson = "list"; lecture.open(); });
+  plan.begin(onChange, say, () => { state.view = "states"; remembered(); enter(); });
+  states.begin((row, rests) => { say(null); if (row && rests) { moving = false; elsewhere(); } }, say);
+  scan.begin({ refused: say, note: remembered, moved: refresh, states: () => { state.view = "states"; remembered(); enter(); } });
+  $("detail").addEventListener("toggle", () => { if (state.view === "states") detailed = $("detail").open; });
+  $("language").addEventListener("click", () => { state.lang = other(); remembered(); takeOver(); });
+  $("save-case").addEventListener("click", () => exported("toml").catch(say));
   $("steps").addEventListener("change", () => { state.steps = Number($("steps").value) || 0; remembered(); refresh(); });
   $("follow").addEventListener("change", () => { state.follow = $("follow").checked ? "yes" : ""; remembered(); });
-  $("unstable").addEventListener("change", markCensus);
+  $("unstable").addEventListener("change", () => { markCensus(); soon(); });
   for (const name of ["contact", "portrait"]) {
     figure.alive($(name), {
       views: () => state.views[name] ?? [],
@@ -346,16 +438,20 @@ async function begin() {
       zoom: (views) => { state.views[name] = views; remembered(); },
     });
   }
-  $("census").addEventListener("click", () => census());
   // The fragment of the address is the state.
-  $("skip").addEventListener("click", (event) => { event.preventDefault(); $("study").focus(); });
+  $("skip").addEventListener("click", (event) => { event.preventDefault(); $(state.view === "states" ? "states" : "view").focus(); });
   for (const button of document.querySelectorAll("[data-export]")) {
     button.addEventListener("click", () => exported(button.dataset.export).catch(say));
   }
   $("knobs").addEventListener("submit", (event) => event.preventDefault());
   addEventListener("popstate", takeOver);
   addEventListener("hashchange", takeOver);
-  study.begin(() => { markCensus(); elsewhere(); }, about.studies, openFile);
+  study.begin(() => { markCensus(); elsewhere(); }, about.studies, openFiles, () => {
+    if (["studies", "data"].includes(state.view)) return;
+    state.view = "data";
+    remembered();
+    enter();
+  });
   $("share").addEventListener("click", () => link.share(basis() === "file").catch(say));
   $("link-close").addEventListener("click", () => $("link").close());
   offline.begin();

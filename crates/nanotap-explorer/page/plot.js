@@ -1,9 +1,12 @@
 // Draws the project's description of a figure on a canvas: panels in a grid, axes with ticks, layers from
 // back to front, legends. Letters have the size of the page's, and panels take the width that there is.
 
-const NARROW = 520;           // CSS pixels below which panels stand in one column
+import { local, t } from "./words.js";
+
+const NARROW = 520;           // CSS pixels below which panels are in one column
 const RATIO = 0.62;           // height of a panel over its width
-const LEAST = 110;            // smallest height of a panel, CSS pixels
+const LEAST = 110;            // smallest height of a panel, CSS pixels, unless the figure says less
+const LOW = 72;               // the same of a figure that ends with the window
 const MM = 3.4;               // CSS pixels for a millimetre of print
 const POINT = 1.7;            // CSS pixels for a typographer's point
 const SCRIPT = 0.72;          // size of a sub- or superscript
@@ -13,6 +16,10 @@ let grown = 1;                // lines and marks grow with the letters
 const dark = matchMedia("(prefers-color-scheme: dark)");
 let theme = null;
 dark.addEventListener("change", () => { theme = null; });
+let forced = null;            // whether it is dark, in place of the system's scheme
+const isDark = () => forced ?? dark.matches;
+/** Draws in dark colours or not, whatever the system's scheme is; `null` follows the system. */
+export function scheme(is) { forced = is; theme = null; }
 function colours() {
   if (theme) return theme;
   const style = getComputedStyle(document.documentElement);
@@ -23,7 +30,7 @@ function colours() {
 /** A colour of print on the present background: in the dark, greys are reversed and dark colours lighter. */
 function shade(colour) {
   const { known } = colours();
-  if (!dark.matches || !colour) return colour ?? "#000";
+  if (!isDark() || !colour) return colour ?? "#000";
   if (!known.has(colour)) {
     const [r, g, b] = [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16) / 255);
     const [high, low] = [Math.max(r, g, b), Math.min(r, g, b)];
@@ -40,7 +47,8 @@ function shade(colour) {
 // Words with markup: _{…} lowers, ^{…} raises, between $ letters are italic.
 
 const cache = new Map();
-function runs(source) {
+function runs(words) {
+  const source = local(words);
   if (cache.has(source)) return cache.get(source);
   const made = [];
   let [maths, script, braces, single] = [false, 0, false, false];
@@ -163,11 +171,22 @@ function entries(panel) {
   return panel.legend === "hidden" ? [] : all;
 }
 
-/** Places the panels of a figure on a canvas of some width. `highest` is the height that it should keep to. */
-export function layout(pen, figure, wide, size, highest, views) {
+/** Whether all values of a panel are 0: nothing is to be seen in it. */
+function isZero({ layers }) {
+  const values = layers.flatMap(({ points }) => points?.y ?? []);
+  return values.length > 1 && layers.every(({ kind }) => kind !== "heatmap" && kind !== "category-map") && values.every((v) => v === 0 || v === null);
+}
+
+/** Places the panels of a figure on a canvas of some width. `highest` is the height that it should keep to,
+ *  also on a narrow canvas if it `fits`. Panels in which all is 0 are named below in place of being drawn. */
+export function layout(pen, figure, wide, size, highest, views, fits = false) {
   const cols = wide < NARROW ? 1 : Math.max(1, figure.cols);
-  const drawn = figure.panels.map((panel, k) => ({ panel, k })).filter(({ panel }) => panel.layers.length || panel.x.label);
-  const rows = Math.ceil((cols === figure.cols ? figure.panels.length : drawn.length) / cols);
+  const all = figure.panels.map((panel, k) => ({ panel, k })).filter(({ panel }) => panel.layers.length || panel.x.label);
+  const some = all.filter(({ panel }) => !isZero(panel));
+  const drawn = some.length ? some : all;
+  const inGrid = cols === figure.cols && drawn.length === all.length;
+  const zero = all.filter((one) => !drawn.includes(one)).map(({ panel }) => plain(panel.y.label));
+  const rows = Math.ceil((inGrid ? figure.panels.length : drawn.length) / cols);
   const range = (k) => {
     const own = views.find((view) => view.panel === k);
     const shared = figure.share_x ? views.findLast((view) => view.panel % figure.cols === k % figure.cols) : own;
@@ -176,15 +195,15 @@ export function layout(pen, figure, wide, size, highest, views) {
   const places = drawn.map(({ panel, k }, n) => {
     const view = range(k);
     const [x, y] = [seen(panel.x, view.x), seen(panel.y, view.y)];
-    const place = cols === figure.cols ? k : n;
+    const place = inGrid ? k : n;
     return { index: k, panel, x, y, row: Math.floor(place / cols), col: place % cols, entries: entries(panel), title: panel.title ?? "" };
   });
   const shares = (list, n) => (list?.length === n ? list : Array(n).fill(1));
-  const across = shares(cols === figure.cols ? figure.column_widths : null, cols);
-  const down = shares(cols === figure.cols ? figure.row_heights : null, rows);
+  const across = shares(inGrid ? figure.column_widths : null, cols);
+  const down = shares(inGrid ? figure.row_heights : null, rows);
   const total = (list) => list.reduce((sum, one) => sum + one, 0);
   const upto = (list, n) => total(list.slice(0, n));
-  // Text beside the panels. Ticks of the final height are not wider than these.
+  // Text next to the panels. Ticks of the final height are not wider than these.
   for (const place of places) {
     const words = [2, 3, 4, 5, 6, 7, 8].flatMap((most) => ticks(place.y, most).at.map(([, text]) => width(pen, text, size)));
     place.words = place.row === rows - 1 || !figure.share_x || !places.some((other) => other.col === place.col && other.row > place.row);
@@ -202,7 +221,7 @@ export function layout(pen, figure, wide, size, highest, views) {
   const free = wide - total(columns);
   const columnWidth = across.map((share) => Math.max(60, free * share / total(across)));
   for (const place of places) {
-    // Legends stand above in as many lines as they need.
+    // Legends are above, in as many lines as they need.
     let [line, at] = [0, 0];
     for (const one of place.entries) {
       const need = width(pen, one.words, size) + 3.2 * size;
@@ -214,10 +233,11 @@ export function layout(pen, figure, wide, size, highest, views) {
   }
   const row = (key) => down.map((_, r) => most(places.filter((one) => one.row === r).map((one) => one[key])));
   const [above, below] = [row("above"), row("below")];
-  const wanted = RATIO * most(columnWidth) * rows;
+  const wanted = (figure.ratio ?? RATIO) * most(columnWidth) * rows;
   // A column of panels is read by scrolling.
-  if (wide < NARROW) highest = Infinity;
-  const heights = Math.max(LEAST * total(down) / Math.max(...down) * 0.8, LEAST * rows * 0.95, Math.min(wanted, highest - total(above) - total(below)));
+  if (wide < NARROW && !fits) highest = Infinity;
+  const least = fits ? LOW : wide < NARROW ? LEAST : figure.least ?? LEAST;
+  const heights = Math.max(least * total(down) / Math.max(...down) * 0.8, least * rows * 0.95, Math.min(wanted, highest - total(above) - total(below)));
   let top = 0;
   down.forEach((share, r) => {
     top += above[r];
@@ -229,7 +249,7 @@ export function layout(pen, figure, wide, size, highest, views) {
     }
     top += height + below[r];
   });
-  return { places, height: Math.ceil(top) };
+  return { places, zero, height: Math.ceil(top + (zero.length ? 1.8 * size : 0)) };
 }
 
 // Layers.
@@ -319,7 +339,8 @@ function layer(pen, place, one) {
       pen.fillStyle = shade(one.colour);
       for (let k = 0; k < xs.length; k += 1) {
         if (!shown(k)) continue;
-        const [left, end] = one.kind === "bars" ? [X(xs[k] - one.width / 2), X(xs[k] + one.width / 2)] : [X(xs[k]) - 0.7, X(xs[k]) + 0.7];
+        // Joined bars are one area.
+        const [left, end] = one.joined ? [X(xs[k] - one.width / 2), X(xs[k] + one.width / 2)].map(Math.round) : one.kind === "bars" ? [X(xs[k] - one.width / 2), X(xs[k] + one.width / 2)] : [X(xs[k]) - 0.7, X(xs[k]) + 0.7];
         pen.fillRect(left, Math.min(foot, Y(ys[k])), end - left, Math.abs(foot - Y(ys[k])));
         if (one.kind === "stems") { pen.beginPath(); pen.arc(X(xs[k]), Y(ys[k]), 2.6 * grown, 0, 7); pen.fill(); }
       }
@@ -370,7 +391,7 @@ function note(pen, place, one, size) {
 }
 
 /** Draws the panels of a layout. */
-export function paint(pen, { places }, size) {
+export function paint(pen, { places, zero, height: tall }, size) {
   const { ink, soft, line } = colours();
   grown = size / 12;
   pen.textBaseline = "alphabetic";
@@ -438,12 +459,13 @@ export function paint(pen, { places }, size) {
     }
   }
   pen.fillStyle = ink;
+  if (zero.length) write(pen, t("zero", { names: zero.join(", ") }), places[0].left, tall - 0.5 * size, size, 0, soft);
 }
 
 /** The panels in words, for readers that cannot see them. */
 export function described(places) {
   const number = (v) => Number(v.toPrecision(3));
   const axis = (one) => `${plain(label(one))} from ${number(one.from)} to ${number(one.to)}`;
-  return places.map((place) => [place.title && plain(place.title), `${axis(place.y)}, against ${axis(place.x)}`, place.bar && axis(seen(place.bar.scale)),
-    place.entries.map((one) => plain(one.words)).join(", ")].filter(Boolean).join(": ")).join(". ");
+  return places.map((place) => local([place.title && plain(place.title), `${axis(place.y)}, against ${axis(place.x)}`, place.bar && axis(seen(place.bar.scale)),
+    place.entries.map((one) => plain(one.words)).join(", ")].filter(Boolean).join(": "))).join(". ");
 }

@@ -2,10 +2,7 @@
 // the present one is used, and shown at the next visit.
 
 const VERSION = "development"; // `cargo xtask page` states a hash of all files here.
-const FILES = [
-  "./", "style.css", "icon.svg", "manifest.webmanifest", "main.js", "state.js", "api.js", "server.js", "workers.js", "worker.js",
-  "knobs.js", "lever.js", "study.js", "figure.js", "plot.js", "link.js", "qr.js", "offline.js",
-];
+const FILES = ["./"]; // … and the names of the others here.
 const PREFIX = "nanotap ";
 // The browser runs one of the two modules.
 const MODULE = new URL(location.href).searchParams.get("module");

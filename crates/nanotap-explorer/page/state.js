@@ -1,36 +1,48 @@
 // The state of the page, and the address that contains all of it: a link reproduces a view.
 
 const empty = () => ({
+  view: "states",             // the part of the page that is shown
+  lang: "",                   // the language of the page's words; empty: the browser's
   preset: "",                 // the case from which the values start, if it is one of the list
   case: "",                   // or its file, as a link contains it: see link.js
   set: {},                    // keys of the case that differ from it: key -> text
   start: "",                  // state at drive phase 0 from which the motion is computed
+  compare: "",                // state that is compared with the chosen one
   follow: "",                 // "yes": a changed parameter continues from the displayed motion
   tab: "approach",
-  lesson: "",                 // a guided start whose words are shown
+  lesson: "",                 // a guided start whose words are shown; or a lesson of the lecture and its step
+  lecture: "",                // a lecturer's own lesson, as a link contains it
   steps: 0,                   // Runge-Kutta steps per period of the motion for comparison; 0: none
   study: {},                  // fields of the study's form: name -> text
   ran: "",                    // "yes": the study was computed
+  plan: {},                   // what is wished in the view Plan: name -> text
   views: {},                  // visible ranges of figures: name -> list of {panel, x, y}
 });
 
 export const state = empty();
 
-/** The texts of case files, by what stands for them in a link; and their names. */
+/** Texts of opened case files, by their code in a link; and their names. */
 export const texts = new Map();
 export const names = new Map();
 
-/** What stands for the case without its changes. */
+/** Preset or opened file that the case starts from. */
 export const basis = () => state.case || state.preset;
 
-const FIELDS = ["preset", "case", "lesson", "start", "follow", "tab", "steps", "ran"];
+const FIELDS = ["view", "lang", "preset", "case", "lesson", "lecture", "start", "compare", "follow", "tab", "steps", "ran"];
+/** Fields of a link that only the view of the studies shows. */
+const OF_STUDIES = ["tab", "ran", "steps"];
 
 /** The fragment of the address for `state`; some fields may have other values. */
 export function encoded(other = {}) {
   const words = new URLSearchParams();
-  for (const name of FIELDS) if (other[name] ?? state[name]) words.set(name, other[name] ?? state[name]);
+  for (const name of FIELDS) {
+    const value = other[name] ?? state[name];
+    const hidden = value === empty()[name] || (OF_STUDIES.includes(name) && !["studies", "data"].includes(state.view));
+    if (value && !hidden) words.set(name, value);
+  }
   for (const [key, value] of Object.entries(state.set)) words.set(`set.${key}`, value);
   for (const [key, value] of Object.entries(state.study)) words.set(`study.${key}`, value);
+  for (const [key, value] of Object.entries(state.plan)) words.set(`plan.${key}`, value);
   for (const [name, views] of Object.entries(state.views)) {
     for (const { panel, x, y } of views) words.set(`view.${name}.${panel}`, [...x, ...y].join(","));
   }
@@ -40,9 +52,13 @@ export function encoded(other = {}) {
 /** Reads the state from the address. */
 export function decode(fragment) {
   Object.assign(state, empty());
-  for (const [name, value] of new URLSearchParams(fragment.replace(/^#/, ""))) {
+  const given = new URLSearchParams(fragment.replace(/^#/, ""));
+  // Links of nanotap 0.2 name no view: theirs was that of the studies.
+  if (!given.has("view") && OF_STUDIES.some((name) => given.has(name))) state.view = "studies";
+  for (const [name, value] of given) {
     if (name.startsWith("set.")) state.set[name.slice(4)] = value;
     else if (name.startsWith("study.")) state.study[name.slice(6)] = value;
+    else if (name.startsWith("plan.")) state.plan[name.slice(5)] = value;
     else if (name.startsWith("view.")) view(name.slice(5).split("."), value.split(",").map(Number));
     else if (name === "steps") state.steps = Math.max(0, Math.min(4000, Number(value) || 0));
     else if (FIELDS.includes(name)) state[name] = value;
@@ -63,6 +79,12 @@ export function remember(finished) {
   else history.replaceState(null, "", address);
   return finished;
 }
+
+/** The chosen state: its row, its case, and the changes that put its distance in place of the setpoint. */
+export const chosen = { row: null, of: "", set: null };
+
+/** Keys that place the tip: the setpoint and the distance, with and without units. */
+export const DISTANCES = ["drive.setpoint", "gap.tip", "gap.beam", "alpha5", "gap"];
 
 let base = { of: "", values: new Map() };
 
@@ -87,8 +109,13 @@ export function caseText(without = []) {
   return JSON.stringify([basis(), kept]);
 }
 
-/** The case as a request contains it. */
-export function theCase() {
-  const set = Object.entries(state.set).map(([key, value]) => `${key}=${value}`);
+/** The case as a request contains it, with the distance of a state in place of its setpoint, if given. */
+export function theCase(distance = null) {
+  const values = { ...state.set, ...distance };
+  if (distance) delete values["drive.setpoint"];
+  const set = Object.entries(values).map(([key, value]) => `${key}=${value}`);
   return state.case ? { text: texts.get(state.case), set } : { preset: state.preset, set };
 }
+
+/** The case at the distance of the chosen state. */
+export const thatCase = () => theCase(chosen.of === caseText() ? chosen.set : null);

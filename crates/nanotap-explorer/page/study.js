@@ -1,18 +1,21 @@
 // The studies: a form for each, its figure in stages of increasing resolution, and clicks that go
 // to a motion.
 
-import { state, basis, caseText, put, remember, statedText, theCase } from "./state.js";
-import { alone, bytes, current, save, stream, stop, superseded } from "./api.js";
+import { DISTANCES, state, basis, caseText, put, remember, statedText, theCase } from "./state.js";
+import { base64Of, bytes, current, save, stream, stop, superseded } from "./api.js";
 import { sameAs } from "./knobs.js";
+import { hand } from "./hand.js";
 import * as figure from "./figure.js";
 import { moves } from "./lever.js";
 import { part } from "./plot.js";
+import { picture } from "./pictures.js";
+import { local, t } from "./words.js";
+import { inField, parts, pointed } from "./entry.js";
+import { make } from "./element.js";
+import * as image from "./image.js";
 
 const $ = (id) => document.getElementById(id);
-const TABS = {
-  approach: "Approach", diagram: "Diagram", branches: "Branches", resonance: "Resonance",
-  basin: "Basins", map: "Two parameters", plan: "Plan", levers: "Levers", image: "Image", data: "Data",
-};
+const TABS = ["approach", "diagram", "branches", "resonance", "basin", "map", "plan", "levers", "image", "data"];
 /** What the studies show, until they are computed. */
 const HINTS = {
   approach: "Amplitude, phase, energy and peak force against the distance, coming nearer and going away.",
@@ -27,17 +30,23 @@ const HINTS = {
   plan: "Where every motion meets the conditions, over free amplitude and setpoint: the window for imaging.",
 };
 const MOST_DATA = 24e6;       // bytes of a measured file
-const COLUMNS = 64;           // heights of a surface that is drawn by hand
 const LINE = 6000;            // milliseconds in which the tip goes along the line of an image
 const FIRST = 5;              // fields of a form that are shown at once, if it has more than one in addition
 const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
 const PAUSE = 250;            // milliseconds after a change before an approach curve is drawn anew
-const TERMINAL = 60000;       // milliseconds after which the page without a server names the terminal
+const TERMINAL = 60000;       // milliseconds of a study for which the page names the terminal
+const TRIAL = 30000;          // the same for an estimate from a trial, which may be too short
+const CALM = 500;             // milliseconds without a change before a study is tried
+const NO_TRIAL = ["data", "image"]; // forms whose study is not tried: their command needs a file
 const OTHER = "computed for other values – compute again";
+/** A tapping curve of the DMT example, with its noise: docs/cases/fit.md. */
+const EXAMPLE = { preset: "dmt", name: "dmt-tapping.csv", rows: "distance (nm),amplitude (nm),phase (deg)\n19.000,18.734,110.34\n17.875,18.388,67.00\n16.750,17.293,59.79\n15.625,16.188,54.08\n14.500,15.029,48.83\n13.375,13.921,44.17\n12.250,12.792,39.86\n11.125,11.691,35.75\n10.000,10.544,31.85\n" };
 const PLAIN = {};             // studies that the page knows from the registry only: name -> what they are about
 let plain = {};               // their forms
 let forms = null;
 let measured = null;          // name and content of the measured file
+let kind = "";                // what it is if not a curve: "calibrate" for thermal noise, "image-states" for images
+let hasImages = false;        // whether the file of a curve has images, too
 let found = null;             // the case of a fit
 let filled = "";              // the form that is shown
 let drawn = null;             // what the displayed figure is of, and where its clicks go
@@ -46,27 +55,33 @@ let pinned = null;            // the figure that is drawn behind
 let shown = null;             // the displayed figure, as it was received
 let motion = null;            // the displayed motion
 let timer = 0;
+let trial = 0;                // the timer of the trial
+let lastTrial = {};           // the study that was tried last, and its command
 let gone = () => {};
 let openCase = () => {};
+let showData = () => {};
 
 const views = () => state.views.study ?? [];
-const asked = () => JSON.stringify([basis(), state.tab, state.study, state.tab === "data" && measured?.[0]]);
-const shape = () => asked() + JSON.stringify([forms[state.tab], state.tab in PLAIN && forms.usual[state.tab]]);
+const calibrates = () => kind === "calibrate" && state.tab === "data";
+/** Name of the form. */
+const form = () => (state.tab === "data" && kind ? kind : state.tab);
+const asked = () => JSON.stringify([basis(), form(), state.study, state.tab === "data" && measured?.[0]]);
+const shape = () => asked() + JSON.stringify([forms[form()], state.tab in PLAIN && forms.usual[state.tab]]);
 const hint = () => HINTS[state.tab] ?? `${PLAIN[state.tab]}.`;
 
 /** The keys of the case that a figure does not depend on: those along its axes. Other keys must be as
  *  they stay along the axis, or the axis is another one. */
 function along(clicks) {
   const names = Object.values(clicks?.set ?? {}).map((key) => key.name);
-  const distances = ["gap.tip", "gap.beam", "drive.setpoint"];
-  if (names.some((name) => distances.includes(name))) return [...names, ...distances];
+  if (names.some((name) => DISTANCES.includes(name))) return [...names, ...DISTANCES];
   const held = Object.entries(clicks?.fixed ?? {}).every(([name, text]) => statedText(name) === text);
   return held ? names : [];
 }
 
 /** What a figure is of. */
 function subject(clicks) {
-  return { form: asked(), case: caseText(along(clicks)), start: state.tab === "basin" ? state.start : "" };
+  // Thermal noise is of no case.
+  return { form: asked(), case: calibrates() ? "" : caseText(along(clicks)), start: state.tab === "basin" ? state.start : "" };
 }
 
 const same = (one, other) => one && ["form", "case", "start"].every((name) => one[name] === other[name]);
@@ -79,7 +94,7 @@ function mark() {
   for (const id of ["study-export", "tables"]) $(id).classList.toggle("stale", other);
   for (const button of document.querySelectorAll("[data-study-export]")) button.disabled = other;
   $("stale").hidden = !other;
-  $("stale").textContent = other ? OTHER : "";
+  $("stale").textContent = other ? state.tab === "data" ? t("studies.fitted") : OTHER : "";
   // A link contains only figures of the same case.
   if (other && state.ran) { state.ran = ""; remember(false); }
   point();
@@ -117,43 +132,50 @@ function choose(name) {
   if (motion) fill(motion);
 }
 
-/** The bytes of a file in base64. */
-const base64Of = (file) => new Promise((done, failed) => {
-  const reader = new FileReader();
-  reader.addEventListener("load", () => done(reader.result.slice(reader.result.indexOf(",") + 1)));
-  reader.addEventListener("error", () => failed(reader.error));
-  reader.readAsDataURL(file);
-});
-
-/** Takes a measured file, or a case file. */
-async function take(file) {
+/** Takes a measured file, or a case file with the files that it names. */
+async function take(...files) {
+  const [file] = files;
   if (!file) return;
-  if (file.name.toLowerCase().endsWith(".toml")) { openCase(file); return; }
+  if (files.some((one) => one.name.toLowerCase().endsWith(".toml"))) { openCase(files); return; }
+  showData();
   if (state.tab !== "data") choose("data");
   if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page reads at most ${MOST_DATA}, the terminal more`; return; }
-  measured = [file.name, { base64: await base64Of(file) }];
-  filled = "";
-  if (motion) fill(motion);
+  open(file.name, { base64: await base64Of(file) });
+}
+
+/** Takes the content of a measured file. */
+function open(...next) {
+  measured = next;
+  hasImages = false;
+  change("");
   compute(false);
 }
 
+/** Shows the form of a curve, of thermal noise or of images. */
+function change(is) {
+  if (is !== kind) state.study = {};
+  kind = is;
+  filled = "";
+  if (motion) fill(motion);
+}
+
 /** `motionChanged` is called when a click selected another motion; `studies` are those of the registry
- *  that have no tab made for them; `openFile` takes a case file. */
-export function begin(motionChanged, studies, openFile) {
+ *  that have no tab made for them; `openFile` takes a case file; `toData` shows the view of measured data. */
+export function begin(motionChanged, studies, openFile, toData) {
   gone = motionChanged;
   openCase = openFile;
+  showData = toData;
   for (const { name, about, form } of studies) { PLAIN[name] = about; plain[name] = form; }
-  $("more").append(...studies.map(({ name, about }) => Object.assign(new Option(name.replaceAll("-", " "), name), { title: about })));
-  $("more").addEventListener("change", () => { if ($("more").value) choose($("more").value); });
   addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
   addEventListener("drop", (event) => {
     if (!event.dataTransfer?.files.length) return;
     event.preventDefault();
-    take(event.dataTransfer.files[0]);
+    take(...event.dataTransfer.files);
   });
-  for (const [name, words] of Object.entries(TABS)) {
+  for (const name of [...TABS, ...Object.keys(PLAIN)]) {
     const tab = document.createElement("button");
-    Object.assign(tab, { type: "button", id: `tab-${name}`, textContent: words });
+    Object.assign(tab, { type: "button", id: `tab-${name}`, title: HINTS[name] ?? `${PLAIN[name]}.` });
+    tab.append(picture(name), t("cards")[name] ?? name.replaceAll("-", " "));
     tab.setAttribute("role", "tab");
     tab.setAttribute("aria-controls", "study-panel");
     tab.addEventListener("click", () => choose(name));
@@ -167,7 +189,13 @@ export function begin(motionChanged, studies, openFile) {
     next.focus();
     next.click();
   });
-  $("study-form").addEventListener("submit", (event) => { event.preventDefault(); state.ran = "yes"; remember(true); compute(false); });
+  $("study-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (state.tab === "data") return;
+    state.ran = "yes";
+    remember(true);
+    compute(false);
+  });
   figure.alive($("study-figure"), {
     views,
     tell: (place) => { $("hover").textContent = place ? `${figure.words(place)}${nearest(place) ? ": a motion is drawn here" : ""}` : ""; },
@@ -189,14 +217,15 @@ export function begin(motionChanged, studies, openFile) {
 export function restore() {
   // A curve that waits to be drawn is of the former tab or case.
   clearTimeout(timer);
-  if (!(state.tab in TABS || state.tab in PLAIN)) state.tab = "approach";
+  if (!(TABS.includes(state.tab) || state.tab in PLAIN)) state.tab = "approach";
   for (const tab of $("tabs").children) {
     const chosen = tab.id === `tab-${state.tab}`;
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
+    // Within the strip of cards alone: the page stays where it is.
+    if (chosen) $("tabs").scrollTo({ left: tab.offsetLeft - 0.4 * $("tabs").clientWidth });
   }
-  $("more").value = state.tab in PLAIN ? state.tab : "";
-  $("study-panel").setAttribute("aria-labelledby", state.tab in PLAIN ? "more" : `tab-${state.tab}`);
+  $("study-panel").setAttribute("aria-labelledby", `tab-${state.tab}`);
   filled = "";
 }
 
@@ -217,14 +246,17 @@ export function fill(next) {
   figure.renew($("study-figure"));
   mark();
   clearTimeout(timer);
+  foresee();
   if (same(asking, subject(asking?.clicks)) || isCurrent()) return;
   if (asking) {
     stop("study");
-    asking = null;
+    wait(null);
     $("progress").textContent = hint();
   }
-  if (state.ran === "yes") compute(false);
-  else if (state.tab === "approach") timer = setTimeout(() => { if (!isCurrent()) compute(true); }, PAUSE);
+  // Measured data are drawn over the model by themselves; a fit stays until the next one.
+  const data = state.tab === "data" && measured && !found;
+  if (state.ran === "yes" && state.tab !== "data") compute(false);
+  else if (state.tab === "approach" || data) timer = setTimeout(() => { if (!isCurrent()) compute(!data); }, PAUSE);
 }
 
 /** Takes a motion that was computed while a slider moves. */
@@ -237,7 +269,7 @@ export function follow(next) {
 function forget() {
   stop("study");
   // Its end is not reported over the words of what follows.
-  asking = null;
+  wait(null);
   drawn = null;
   found = null;
   shown = null;
@@ -248,38 +280,92 @@ function forget() {
   $("hover").textContent = "";
 }
 
+/** Names the terminal for a study that takes this many milliseconds, or an unknown time. */
+function long(time, command) {
+  const words = Number.isFinite(time) ? t(time < 5.4e6 ? "studies.minutes" : "studies.hours", { count: Math.max(1, Math.round(time / (time < 5.4e6 ? 6e4 : 3.6e6))) }) : t("studies.minute");
+  const copy = make("button", { type: "button", textContent: t("plan.copy") });
+  copy.addEventListener("click", async () => {
+    const done = await navigator.clipboard?.writeText(command).then(() => true, () => false);
+    copy.textContent = t(done ? "plan.copied" : "plan.notCopied");
+  });
+  $("long").replaceChildren(t("studies.long", { time: words }), ...(command ? [" ", t("studies.terminal"), make("pre", { tabIndex: 0, textContent: command }), copy] : []));
+}
+
+/** Whether a field is of one number, with or without a unit. */
+const isNumber = ({ name, hint, choices }) => !choices && !/[,=:]|STATE/.test(hint ?? "") && !["start", "state", "profile"].includes(name);
+/** The text of a field as the program reads it. */
+const read = (field, text) => (isNumber(field) ? pointed(text) : text);
+
+const options = () => Object.fromEntries([...new FormData($("study-form"))].map(([name, text]) => [name, read(forms[form()].find((field) => field.name === name) ?? {}, text)]));
+
+/** Tries a study for a moment once its form and the case rest, and says so if it takes long. */
+function foresee() {
+  clearTimeout(trial);
+  stop("trial");
+  const of = JSON.stringify(subject(null));
+  if (lastTrial.of === of) return;
+  lastTrial = { of };
+  if (!asking) $("long").textContent = "";
+  if (NO_TRIAL.includes(state.tab) || isCurrent()) return;
+  trial = setTimeout(async () => {
+    if (asking) { lastTrial = {}; return; }
+    try {
+      await stream("trial", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options: options(), estimate: true }, ({ estimate, command }) => {
+        if (lastTrial.of !== of) return;
+        lastTrial = { of, command };
+        if (1000 * estimate > TRIAL) long(1000 * estimate, command);
+      });
+    } catch {
+      // What is wrong is reported when the study is computed.
+    }
+  }, CALM);
+}
+
+/** Takes the request that is being computed; only then it can be stopped. */
+function wait(own) {
+  asking = own;
+  const button = $("stop");
+  if (button) button.hidden = !own;
+}
+
 /** Creates the form of the tab with its initial values. */
 function build() {
-  const form = $("study-form");
-  const fields = forms[state.tab].map(entry);
-  if (state.tab in PLAIN || state.tab === "data") {
-    const more = document.createElement("details");
-    more.append(Object.assign(document.createElement("summary"), { textContent: `${fields.length - FIRST} more` }), ...fields.splice(FIRST));
-    more.className = "row";
-    if (more.children.length > 2) fields.push(more);
-  }
-  form.replaceChildren(...fields);
+  const box = $("study-form");
+  const fields = forms[form()].map(entry);
+  const fold = (words, from, open = false) => {
+    if (fields.length > from + 1) fields.push(make("details", { className: "row", open }, make("summary", { textContent: words }), ...fields.splice(from)));
+  };
+  if (state.tab in PLAIN || state.tab === "data") fold(t("studies.fields", { count: fields.length - FIRST }), FIRST);
+  if (state.tab === "approach") fold(t("studies.range"), 0, Boolean(state.study.from || state.study.to));
+  const note = $("long");
+  box.replaceChildren(...fields);
   const button = (words, pressed, id) => {
-    const made = Object.assign(document.createElement("button"), { type: pressed ? "button" : "submit", textContent: words });
+    const made = make("button", { type: pressed ? "button" : "submit", textContent: words });
     if (id) made.id = id;
     if (pressed) made.addEventListener("click", pressed);
-    form.append(made);
+    box.append(made);
     return made;
   };
   if (state.tab === "data") {
-    const file = Object.assign(document.createElement("input"), { type: "file" });
+    const file = make("input", { type: "file" });
     file.addEventListener("change", () => take(file.files[0]));
     const label = document.createElement("label");
-    label.append(measured ? `${measured[0]} ` : "measured file ", file);
-    form.prepend(label);
+    label.append(measured ? `${measured[0]} ` : `${t("data.file")} `, file);
+    box.prepend(label);
   }
-  button(state.tab === "data" ? "Show" : "Compute");
-  if (state.tab === "data") {
-    button("Fit", () => compute(false, { fit: "yes" }), "fit");
-    button("Force without a law", () => compute(false, { reconstruct: "yes" }), "reconstruct").title
-      = "Conservative force and dissipation against distance from the curve, without a contact law";
+  box.append(note);
+  if (state.tab !== "data") button(t("studies.compute"));
+  else if (kind === "image-states") {
+    button(t("data.image.again"), () => compute(false), "image-again");
+    if (hasImages) button(t("data.image.curve"), () => open(...measured), "image-curve");
+  } else if (!kind) {
+    button(t("data.fit"), () => compute(false, { fit: "yes" }), "fit");
+    button(t("data.force"), () => compute(false, { reconstruct: "yes" }), "reconstruct").title = t("data.forceAbout");
+    if (hasImages) button(t("data.image.ask"), () => compute(false, { "image-states": "first" }), "image-states").title = t("data.image.askAbout");
+    if (measured) button(t("data.calibrate"), () => compute(false, { calibrate: "first" }), "calibrate").title = t("data.calibrateAbout");
+    else if (state.preset === EXAMPLE.preset) button(t("data.example"), () => open(EXAMPLE.name, EXAMPLE.rows), "example-data");
   }
-  button("Stop", () => stop("study"));
+  button(t("studies.stop"), () => stop("study"), "stop").hidden = !asking;
   const pin = button(pinned ? "Unpin" : "Pin", () => {
     const before = pinned;
     pinned = pinned || !drawn ? null : shown;
@@ -298,22 +384,25 @@ function build() {
 
 /** A field of the form. */
 function entry(field) {
-  if (field.drawn) return hand(field);
+  if (field.drawn) return hand(field, mark, again);
   const label = document.createElement("label");
-  label.textContent = `${field.words} `;
+  const { words, hint, choices } = form() === "image-states" ? image.field(field) : field;
+  label.textContent = `${words} `;
   label.title = field.about ?? "";
   const input = document.createElement(field.choices ? "select" : "input");
-  for (const choice of field.choices ?? []) input.add(new Option(choice, choice));
+  (field.choices ?? []).forEach((choice, k) => input.add(new Option(choices[k], choice)));
   // What a study of the registry needs has a usual value for the case.
   const usual = state.tab in PLAIN ? forms.usual[state.tab]?.[field.name] : undefined;
-  Object.assign(input, { name: field.name, value: state.study[field.name] ?? usual ?? field.value });
-  if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: field.hint ?? "" });
+  Object.assign(input, { name: field.name, value: inField(state.study[field.name] ?? usual ?? field.value) });
+  if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: hint ?? "" });
   input.addEventListener("change", () => {
-    state.study[field.name] = input.value;
+    state.study[field.name] = read(field, input.value);
     if (field.name === "surface") for (const box of $("study-form").querySelectorAll(".hand")) box.hidden = input.value !== "drawn";
     filled = shape();
     remember(true);
     mark();
+    foresee();
+    if (state.tab === "data" && measured) compute(false);
   });
   label.append(input);
   if (field.slider) label.append(slide(field, input));
@@ -322,11 +411,11 @@ function entry(field) {
 
 /** A slider of a field, logarithmic around its usual value. */
 function slide({ words, slider: { from, to, usual, unit } }, input) {
-  const range = Object.assign(document.createElement("input"), { type: "range", min: 0, max: 1000 });
+  const range = make("input", { type: "range", min: 0, max: 1000 });
   range.setAttribute("aria-label", `${words}, slider`);
-  const [, number, of] = /^([\d.e+-]+) ?(.*)$/.exec(input.value) ?? [];
-  range.value = 1000 * Math.log((of === unit ? Number(number) : usual) / from) / Math.log(to / from);
-  range.addEventListener("input", () => { input.value = `${Number((from * (to / from) ** (range.value / 1000)).toPrecision(3))}${unit ? ` ${unit}` : ""}`; });
+  const { number, unit: of } = parts(input.value) ?? {};
+  range.value = 1000 * Math.log((of === unit ? number : usual) / from) / Math.log(to / from);
+  range.addEventListener("input", () => { input.value = inField(`${Number((from * (to / from) ** (range.value / 1000)).toPrecision(3))}${unit ? ` ${unit}` : ""}`); });
   range.addEventListener("change", () => {
     input.dispatchEvent(new Event("change"));
     again();
@@ -340,56 +429,6 @@ function again() {
   state.ran = "yes";
   remember(true);
   compute(false);
-}
-
-/** A surface that is drawn by hand: a pointer sets its heights, arrow keys move and change one. */
-function hand({ name, drawn: word }) {
-  const heights = Array.from({ length: COLUMNS }, () => 0);
-  (state.study[name] ?? "").split(",").forEach((text, k) => { if (text !== "" && k < COLUMNS) heights[k] = Math.min(1, Math.max(0, Number(text) || 0)); });
-  const box = Object.assign(document.createElement("div"), { className: "hand", hidden: (state.study.surface ?? "") !== word });
-  const field = Object.assign(document.createElement("input"), { type: "hidden", name, value: state.study[name] ?? "" });
-  const canvas = Object.assign(document.createElement("canvas"), { width: COLUMNS * 8, height: 96, tabIndex: 0 });
-  canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", "Surface drawn by hand: drag to set its heights; arrow keys move along the line and change the height there");
-  let at = 0;
-  let last = null;
-  const show = () => {
-    const pen = canvas.getContext("2d");
-    const style = getComputedStyle(document.documentElement);
-    pen.clearRect(0, 0, canvas.width, canvas.height);
-    pen.fillStyle = style.getPropertyValue("--sample");
-    heights.forEach((height, k) => pen.fillRect(8 * k, 92 - 88 * height, 8, 4 + 88 * height));
-    if (document.activeElement === canvas) { pen.fillStyle = style.getPropertyValue("--accent"); pen.fillRect(8 * at, 92 - 88 * heights[at], 8, 3); }
-  };
-  const keep = () => { field.value = state.study[name] = heights.map((height) => Number(height.toFixed(2))).join(","); remember(true); mark(); };
-  const set = (event) => {
-    const area = canvas.getBoundingClientRect();
-    const k = Math.min(COLUMNS - 1, Math.max(0, Math.floor((event.clientX - area.left) / area.width * COLUMNS)));
-    const height = Math.min(1, Math.max(0, (area.bottom - event.clientY) / area.height));
-    // A quick pointer leaves no gaps.
-    const from = last ?? { k, height };
-    const steps = Math.max(1, Math.abs(k - from.k));
-    for (let n = 0; n <= steps; n += 1) heights[Math.round(from.k + (k - from.k) * n / steps)] = from.height + (height - from.height) * n / steps;
-    last = { k, height };
-    at = k;
-    show();
-  };
-  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); last = null; set(event); });
-  canvas.addEventListener("pointermove", (event) => { if (canvas.hasPointerCapture(event.pointerId)) set(event); });
-  canvas.addEventListener("pointerup", () => { keep(); again(); });
-  canvas.addEventListener("keydown", (event) => {
-    const [along, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] }[event.key] ?? [];
-    if (along === undefined) return;
-    event.preventDefault();
-    at = (at + along + COLUMNS) % COLUMNS;
-    heights[at] = Math.min(1, Math.max(0, heights[at] + up));
-    show();
-    if (up) keep();
-  });
-  for (const event of ["focus", "blur"]) canvas.addEventListener(event, show);
-  box.append(field, canvas);
-  setTimeout(show);
-  return box;
 }
 
 /** The tip goes along the line of an image again and again, while the lever moves. */
@@ -418,32 +457,30 @@ function height(line, at) {
 
 /** Shows the tables of a study. A row that has changes to the case makes them. */
 function show(tables) {
-  const make = (name, ...children) => { const made = document.createElement(name); made.append(...children); return made; };
   $("tables").replaceChildren(...(tables ?? []).map(({ title, heads, rows }) => {
     const table = make("table");
-    if (title) table.append(make("caption", title));
+    if (title) table.append(make("caption", {}, local(title)));
     if (heads.some(([words]) => words)) {
-      table.append(make("thead", make("tr", ...heads.map(([words, about]) => Object.assign(make("th", words), { scope: "col", title: about })))));
+      table.append(make("thead", {}, make("tr", {}, ...heads.map(([words, about]) => make("th", { scope: "col", title: about }, words)))));
     }
-    table.append(make("tbody", ...rows.map(({ cells, set }) => {
+    table.append(make("tbody", {}, ...rows.map(({ cells, set }) => {
       const [first, ...rest] = cells;
-      const name = set ? Object.assign(make("button", first), { type: "button" }) : first;
-      const line = make("tr", Object.assign(make("th", name), { scope: "row" }), ...rest.map((cell) => make("td", cell)));
+      const name = set ? make("button", { type: "button" }, local(first)) : local(first);
+      const line = make("tr", {}, make("th", { scope: "row" }, name), ...rest.map((cell) => make("td", {}, local(cell))));
       if (set) { line.className = "choice"; line.addEventListener("click", () => adopt(set)); }
       return line;
     })));
     // A long table scrolls by itself, also by keys, so that what is below stays in reach.
-    return Object.assign(make("div", table), { tabIndex: 0, role: "region", ariaLabel: title || "table" });
+    return make("div", { tabIndex: 0, role: "region", ariaLabel: title || "table" }, table);
   }));
   if (!found) return;
   const { set, take, file, save: words, name } = found;
   const button = (text, pressed) => {
-    const made = Object.assign(make("button", text), { type: "button" });
+    const made = make("button", { type: "button" }, text);
     made.addEventListener("click", pressed);
     return made;
   };
-  const row = make("p", ...(set ? [button(take, () => adopt(set))] : []), button(words, () => save(new Blob([file]), name)));
-  row.className = "row";
+  const row = make("p", { className: "row" }, set && button(take, () => adopt(set)), button(words, () => save(new Blob([file]), name)));
   $("tables").append(row);
 }
 
@@ -460,58 +497,68 @@ function adopt(set) {
 /** Computes the figure of the form, in stages; a `quick` one ends after the first. */
 async function compute(quick, more = {}) {
   clearTimeout(timer);
-  const options = { ...Object.fromEntries(new FormData($("study-form"))), ...more };
+  clearTimeout(trial);
+  stop("trial");
+  const given = { ...options(), ...more, ...(state.tab === "data" && kind && { [kind]: "yes" }) };
   const data = state.tab === "data" ? { data: measured } : {};
   $("progress").textContent = "computing …";
   const own = { ...subject(null), clicks: null, set: { ...state.set } };
   const whole = caseText();
-  asking = own;
+  wait(own);
   let request = null;
-  const warn = () => {
-    if (!alone || asking !== own) return;
-    const command = own.clicks ? `save the case file, then: ${$("study-command").textContent}` : "nanotap explore";
-    $("long").textContent = `This takes long in a browser. On all processors of a machine: ${command}`;
-  };
-  const slow = setTimeout(warn, TERMINAL);
+  const warn = (time) => { if (asking === own) long(time, own.clicks ? $("study-command").textContent : lastTrial.command); };
+  const slow = setTimeout(() => warn(NaN), TERMINAL);
   const begun = performance.now();
   try {
-    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, quick, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
+    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options: given, quick, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
       // An answer for an older case is dropped.
       if (asking !== own) return;
       if (message.progress) {
-        $("progress").textContent = message.progress;
+        $("progress").textContent = local(message.progress);
         // What is done shows how long the rest takes.
         const [, done, total] = /^(\d+) of (\d+)/.exec(message.progress) ?? [];
-        if ((performance.now() - begun) * total / done > TERMINAL) warn();
+        const whole = (performance.now() - begun) * total / done;
+        if (whole > TERMINAL) warn(whole);
         return;
       }
-      if (!own.clicks && caseText() !== whole) { request?.abort(); return; }
+      if (message.form && !kind) {
+        // The file turned out to be of thermal noise, or of images.
+        kind = message.form;
+        state.study = {};
+        Object.assign(own, subject(null));
+        filled = shape();
+        build();
+      }
+      if (!own.clicks && !calibrates() && caseText() !== whole) { request?.abort(); return; }
       own.clicks = message.clicks;
       Object.assign(own, { case: own.case && caseOf(own, message.clicks) });
       drawn = own;
       shown = message.figure ?? null;
       found = message.found ?? null;
-      $("progress").textContent = message.words;
+      if (message.has_images && !hasImages) { hasImages = true; build(); }
+      $("progress").textContent = message.image ? image.sentence(message.image) : local(message.words);
       $("study-command").textContent = message.command;
       $("study-python").textContent = message.python;
       $("study-export").hidden = false;
       for (const button of document.querySelectorAll("[data-study-export]")) button.hidden = !shown;
       $("study-figure").hidden = !shown;
       show(message.tables);
-      if (message.figure) figure.put($("study-figure"), message.figure);
+      if (message.image) $("tables").replaceChildren(...image.details(message.image));
+      if (message.figure) figure.put($("study-figure"), message.image ? image.inWords(message.figure) : message.figure);
       mark();
       scan();
-      if (quick) $("progress").textContent = `${message.words}; “Compute” refines the curve and follows its branches`;
+      if (quick) $("progress").textContent = `${local(message.words)}; “Compute” refines the curve and follows its branches`;
     });
     request = current("study");
     await sent;
   } catch (error) {
-    if (asking === own) $("progress").textContent = superseded(error) ? "stopped" : error.message;
+    if (asking === own) $("progress").textContent = superseded(error) ? "stopped" : local(error.message);
   }
   clearTimeout(slow);
   if (asking && asking !== own) return;
-  asking = null;
+  wait(null);
   $("long").textContent = "";
+  if (quick) { lastTrial = {}; foresee(); }
 }
 
 /** The case of a figure, without the keys along its axes. */

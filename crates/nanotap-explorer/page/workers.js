@@ -1,8 +1,8 @@
-// Requests to the core in Web Workers of this page: one for motions, one for coexisting motions, one for
-// studies. A worker answers one request after another. A request that is no longer wanted is ended with its
+// Requests to the core in Web Workers of this page: one for motions, and one for each kind of request that
+// takes longer or must not wait for it. A worker answers one request after another. A request that is no longer wanted is ended with its
 // worker; the next worker starts at once, from the same compiled module.
 
-const NAMES = { "/api/attractors": "census", "/api/study": "study" };
+const NAMES = { "/api/states": "states", "/api/curve": "curve", "/api/attractors": "census", "/api/knock": "knock", "/api/force": "force", "/api/margins": "knock", "/api/study": "study" };
 const TOO_OLD = "this browser cannot run nanotap, which needs WebAssembly with SIMD and the decompression of streams: use one of 2023 or later";
 const workers = new Map();
 let compiled = null;

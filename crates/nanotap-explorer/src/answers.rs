@@ -7,7 +7,10 @@ use serde_json::Value;
 use nanotap::control::Control;
 
 use crate::api_error::ApiError;
-use crate::{Explorer, census, export, figures, law, motion, preset, study};
+use crate::{
+    Explorer, census, choice, curve, export, figures, force, law, motion, open, preset, states,
+    study, upset,
+};
 
 /// A kind of request, by how long its answer may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +65,7 @@ struct Request {
     answer: fn(&Explorer, &[u8], &Control<'_>, Line<'_>) -> Result<Content, ApiError>,
 }
 
-const REQUESTS: [Request; 8] = [
+const REQUESTS: [Request; 15] = [
     Request {
         path: "/api/about",
         work: Work::Short,
@@ -72,6 +75,11 @@ const REQUESTS: [Request; 8] = [
         path: "/api/case",
         work: Work::Short,
         answer: |explorer, _, _, _| Ok(("application/toml", export::shown(explorer)?.into_bytes())),
+    },
+    Request {
+        path: "/api/open",
+        work: Work::Short,
+        answer: |_, body, _, _| Ok(("application/toml", open::opened(&read(body)?)?.into_bytes())),
     },
     Request {
         path: "/api/motion",
@@ -86,6 +94,46 @@ const REQUESTS: [Request; 8] = [
         answer: |explorer, body, _, _| Ok(json(&law::changes(explorer, &read(body)?)?)),
     },
     Request {
+        path: "/api/force",
+        work: Work::Short,
+        answer: |explorer, body, _, _| Ok(json(&force::force(explorer, &read(body)?)?)),
+    },
+    Request {
+        path: "/api/choice",
+        work: Work::Short,
+        answer: |explorer, body, _, _| Ok(json(&choice::changes(explorer, &read(body)?)?)),
+    },
+    Request {
+        path: "/api/states",
+        work: Work::Short,
+        answer: |explorer, body, control, _| {
+            Ok(json(&states::states(explorer, &read(body)?, control)?))
+        },
+    },
+    Request {
+        path: "/api/knock",
+        work: Work::Long,
+        answer: |explorer, body, control, _| {
+            Ok(json(&upset::knock(explorer, &read(body)?, control)?))
+        },
+    },
+    Request {
+        path: "/api/margins",
+        work: Work::Long,
+        answer: |explorer, body, control, _| {
+            Ok(json(&upset::margins(explorer, &read(body)?, control)?))
+        },
+    },
+    Request {
+        path: "/api/curve",
+        work: Work::Lines,
+        answer: |explorer, body, control, line| {
+            Ok(in_lines(line, || {
+                curve::curve(explorer, &read(body)?, control, line)
+            }))
+        },
+    },
+    Request {
         path: "/api/attractors",
         work: Work::Long,
         answer: |explorer, body, control, _| {
@@ -96,12 +144,9 @@ const REQUESTS: [Request; 8] = [
         path: "/api/study",
         work: Work::Lines,
         answer: |explorer, body, control, line| {
-            let studied =
-                read(body).and_then(|request| study::study(explorer, &request, control, line));
-            if let Err(refusal) = studied {
-                line(refusal.json());
-            }
-            Ok((LINES, Vec::new()))
+            Ok(in_lines(line, || {
+                study::study(explorer, &read(body)?, control, line)
+            }))
         },
     },
     Request {
@@ -152,6 +197,14 @@ impl Explorer {
             },
         }
     }
+}
+
+/// An answer in lines, of which the last is the reason if it was refused.
+fn in_lines(line: Line<'_>, work: impl FnOnce() -> Result<(), ApiError>) -> Content {
+    if let Err(refusal) = work() {
+        line(refusal.json());
+    }
+    (LINES, Vec::new())
 }
 
 fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, ApiError> {

@@ -67,9 +67,14 @@ impl ApiError {
         }
     }
 
+    /// What is wrong, in words.
+    pub(crate) fn message(&self) -> String {
+        self.error.to_string()
+    }
+
     /// The JSON that the page reads.
     pub(crate) fn json(&self) -> Value {
-        json!({ "error": self.error.to_string(), "keys": self.keys })
+        json!({ "error": self.message(), "keys": self.keys })
     }
 }
 

@@ -1,8 +1,10 @@
 //! All coexisting motions, each with a state that starts it.
 
+use nanotap::case::Case;
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
+use nanotap::model::Model;
 use nanotap::observe::Observables;
 use nanotap::study::attractors::{Attractors, AttractorsOptions, AttractorsStudy};
 use nanotap::study::orbit::OrbitReport;
@@ -15,6 +17,8 @@ use crate::api_error::ApiError;
 use crate::motion_request::{Start, model_of};
 use crate::preset::CaseSpec;
 use crate::readout::regime;
+use crate::row::{Shown, row};
+use crate::states::of_orbit;
 
 /// Longest period of the unstable orbits that are searched for.
 const UNSTABLE: usize = 4;
@@ -35,31 +39,53 @@ pub(crate) fn listed(
     control: &Control<'_>,
 ) -> Result<Value, ApiError> {
     let case = census.case.case(app, control)?;
-    model_of(&case)?;
+    let model = model_of(&case)?;
     let request = AttractorsOptions {
         unstable: if census.unstable { UNSTABLE } else { 0 },
         ..AttractorsOptions::default()
     };
     let found = AttractorsStudy::run(&case, &request, control)?;
-    let units = case.units();
-    let stable = found.attractors.iter().filter_map(|one| {
+    let mut motions: Vec<Value> = Vec::new();
+    for one in &found.attractors {
         let share = format!("{:.2} % of the initial states", 100.0 * one.share.fraction);
-        if let Some(orbit) = &one.orbit {
-            return Some(entry(orbit, None, &share, &units));
-        }
-        let non_periodic = one.non_periodic.as_ref()?;
-        let name = one.classification.name();
-        Some(json!({
-            "words": format!("{name}, {share}"),
-            "start": Start::text(None, &non_periodic.state),
-            "amplitude": non_periodic.observables.amplitude,
-            "shown": shown_observables(&non_periodic.observables, &units),
-        }))
-    });
-    let unstable = found.unstable.iter().flatten();
-    let unstable = unstable.map(|o| entry(&o.motion, Some(o.motion.period), "unstable", &units));
-    let motions: Vec<Value> = stable.chain(unstable).collect();
-    Ok(json!({ "motions": motions, "bound": bound(&found) }))
+        let mut entry = if let Some(orbit) = &one.orbit {
+            entry(&case, &model, orbit, None, &share)?
+        } else if let Some(recorded) = &one.non_periodic {
+            let class = one.classification.name();
+            json!({
+                "words": format!("{class}, {share}"),
+                "start": Start::text(None, &recorded.state),
+                "amplitude": recorded.observables.amplitude,
+                "shown": shown_observables(&recorded.observables, &case.units()),
+                "exponent": one.lyapunov.first(),
+                "row": row(&Shown {
+                    case: &case,
+                    model: &model,
+                    state: &recorded.state,
+                    period: None,
+                    radius: None,
+                    class,
+                    observables: &recorded.observables,
+                })?,
+            })
+        } else {
+            continue;
+        };
+        entry["share"] = one.share.fraction.into();
+        motions.push(entry);
+    }
+    for orbit in found.unstable.iter().flatten() {
+        let orbit = &orbit.motion;
+        motions.push(entry(&case, &model, orbit, Some(orbit.period), "unstable")?);
+    }
+    Ok(json!({
+        "motions": motions,
+        "bound": bound(&found),
+        "starts": found.starts,
+        "unseen": found.unseen.as_ref().map(|unseen| unseen.fraction),
+        "undecided": found.undecided_fraction.count,
+        "unbounded": found.unbounded.count,
+    }))
 }
 
 /// The amplitude and the peak force of a lever, as an instrument reads them; without units half of
@@ -78,15 +104,23 @@ fn shown_observables(observables: &Observables, units: &Units) -> String {
     format!("amplitude A {amplitude}, peak force {force}")
 }
 
-fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str, units: &Units) -> Value {
-    json!({
+/// A motion of the list.
+fn entry(
+    case: &Case,
+    model: &Model,
+    orbit: &OrbitReport,
+    period: Option<usize>,
+    remark: &str,
+) -> Result<Value, ApiError> {
+    Ok(json!({
         "words": format!("period {}, {}, {remark}", orbit.period, regime(&orbit.observables)),
         "start": Start::text(period, &orbit.state),
         "period": orbit.period,
         "stable": orbit.stable,
         "amplitude": orbit.observables.amplitude,
-        "shown": shown_observables(&orbit.observables, units),
-    })
+        "shown": shown_observables(&orbit.observables, &case.units()),
+        "row": of_orbit(case, model, orbit)?,
+    }))
 }
 
 /// Text on how many motions may be missing.

@@ -4,11 +4,16 @@ use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key, Value as Stated};
 use nanotap::model::Model;
 use nanotap::observe::time_series::state_names;
+use nanotap::study::calibrate::CalibrateOptions;
+use nanotap::study::image_states::ImageStatesOptions;
+use nanotap::study::lever::{time_constant, usual_gain};
 use nanotap::study::registry::{STUDIES, StudyEntry, study};
-use nanotap::study::request::{Property, properties};
+use nanotap::study::request::{Property, properties, schema};
 use nanotap::study::start_box::default_box;
+use schemars::Schema;
 use serde_json::{Value, json};
 
+use crate::api_error::ApiError;
 use crate::knobs;
 use crate::maps::Shows;
 
@@ -22,7 +27,7 @@ const NO: &str = "no";
 /// The choice of the tip of the case for other levers.
 pub(crate) const OWN_TIP: &str = "of the case";
 /// Studies with a tab, or a place on the page, made for them.
-const PLACED: [&str; 10] = [
+const PLACED: [&str; 11] = [
     "simulate",
     "orbit",
     "attractors",
@@ -32,6 +37,7 @@ const PLACED: [&str; 10] = [
     "scan",
     "fit",
     "reconstruct",
+    "image-states",
     "lever",
 ];
 /// Values of a sweep, and along each axis of a window, to begin with.
@@ -54,13 +60,17 @@ pub(crate) fn plain(entry: &StudyEntry) -> Value {
 
 /// The form of a study's options.
 fn of_options(entry: &StudyEntry) -> Vec<Value> {
-    let schema = (entry.request)();
+    of_schema(&(entry.request)())
+}
+
+/// The form of options with this schema.
+fn of_schema(schema: &Schema) -> Vec<Value> {
     let own = |property: &Property<'_>| property.schema["x-own"] == true;
     let field = |property: Property<'_>| {
         let words = property.words();
         let mut field = json!({
             "name": property.name,
-            "words": property.name.replace('_', " "),
+            "words": short(&property),
             "about": property.description(),
             "value": property.default().map_or_else(String::new, shown),
         });
@@ -75,10 +85,59 @@ fn of_options(entry: &StudyEntry) -> Vec<Value> {
         }
         field
     };
-    properties(&schema)
+    properties(schema)
         .filter(|property| !own(property))
         .map(field)
         .collect()
+}
+
+/// Options of a calibration that are shown first.
+const CALIBRATED_BY: [&str; 5] = ["sensitivity", "temperature", "averages", "length", "width"];
+
+/// The fields of a thermal calibration.
+fn calibration() -> Vec<Value> {
+    let mut fields = of_schema(&schema::<CalibrateOptions>());
+    sort_first(&mut fields, &CALIBRATED_BY);
+    fields
+}
+
+/// Options of the states of an image that are shown first.
+const OF_IMAGES: [&str; 5] = ["setpoint", "phase_offset", "sense", "direction", "convert"];
+
+/// The fields of the states of an image.
+fn image_states() -> Vec<Value> {
+    let mut fields = of_schema(&schema::<ImageStatesOptions>());
+    sort_first(&mut fields, &OF_IMAGES);
+    fields
+}
+
+/// Puts fields with these names first.
+fn sort_first(fields: &mut [Value], first: &[&str]) {
+    fields.sort_by_key(|field| {
+        let found = first.iter().position(|name| field["name"] == *name);
+        found.unwrap_or(first.len())
+    });
+}
+
+/// Longest words beside a field.
+const SHORT: usize = 44;
+
+/// What an option is, in few words: the beginning of its description, or its name.
+fn short(property: &Property<'_>) -> String {
+    let text = property.description();
+    let first = text.split([':', ';', ',', '(', '.']).next();
+    let first = first.unwrap_or_default().trim();
+    if first.is_empty() || first.len() > SHORT {
+        return property.name.replace('_', " ");
+    }
+    // A name such as "Poisson's ratio" or "A0" keeps its capital.
+    let mut letters = first.chars();
+    let head = letters.next().map(|head| head.to_lowercase().to_string());
+    let is_name = first.starts_with("Poisson") || first.starts_with("Young");
+    match head {
+        Some(head) if !is_name => head + letters.as_str(),
+        _ => first.to_owned(),
+    }
 }
 
 /// A default as a form has it.
@@ -90,6 +149,25 @@ fn shown(value: &Value) -> String {
         Value::Array(all) => all.iter().map(shown).collect::<Vec<_>>().join(","),
         other => other.to_string(),
     }
+}
+
+/// The condition that stands for a wish of the view Plan; none for any state.
+pub(crate) fn wish(name: &str) -> Result<Option<&'static str>, ApiError> {
+    let wishes = [
+        ("one", Some("states = 1")),
+        ("any", None),
+        ("tap", Some("contact_fraction > 0")),
+        ("away", Some("contact_fraction <= 0")),
+    ];
+    let found = wishes.into_iter().find(|(wish, _)| *wish == name);
+    let names = wishes.map(|(wish, _)| wish).join(", ");
+    let unknown = || {
+        ApiError::input(
+            format!("expected one of {names}, got `{name}`"),
+            "choose one",
+        )
+    };
+    found.map(|(_, condition)| condition).ok_or_else(unknown)
 }
 
 /// Peak force that an ordinary polymer survives.
@@ -213,6 +291,8 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         "plan": plan,
         "levers": levers,
         "data": data,
+        "calibrate": calibration(),
+        "image-states": image_states(),
         "image": image,
         "basin": slice,
     })
@@ -260,6 +340,8 @@ fn data(case: &Case) -> Vec<Value> {
 pub(crate) const SURFACES: [&str; 5] = [OWN_SURFACE, "step", "grating", "particle", DRAWN];
 /// The surface that is drawn by hand.
 pub(crate) const DRAWN: &str = "drawn";
+/// A surface without features, which the view of a line offers, too.
+pub(crate) const FLAT: &str = "flat";
 const OWN_SURFACE: &str = "of the case";
 /// Drive periods of a line in one direction.
 const LINE_PERIODS: f64 = 5000.0;
@@ -272,7 +354,7 @@ fn image(case: &Case, base: &Case) -> Vec<Value> {
     let own = case.scan().is_some();
     let frequency = base.get(Key::DriveFrequency);
     // Half the rate at which the lever's amplitude follows.
-    let gain = std::f64::consts::PI * frequency / (2.0 * view.lever.quality_factor);
+    let gain = usual_gain(time_constant(view.lever.quality_factor, frequency));
     let surfaces = &SURFACES[usize::from(!own)..];
     let field = |name: &str, words: &str, value: String| {
         let value = if own { String::new() } else { value };
@@ -302,6 +384,29 @@ fn image(case: &Case, base: &Case) -> Vec<Value> {
             "",
         ),
     ]
+}
+
+/// The fields of a line: those of an image, and a flat surface; none for a case that is not a lever.
+pub(crate) fn line(case: &Case) -> Vec<Value> {
+    let mut fields = image(case, case);
+    let size = case.scan().and_then(|scan| scan.get("size"));
+    for field in &mut fields {
+        match field["name"].as_str() {
+            Some("surface") => {
+                if let Some(choices) = field["choices"].as_array_mut() {
+                    choices.push(json!(FLAT));
+                }
+            }
+            // A feature is placed along a line of this length.
+            Some("size") => match size {
+                Some(Value::String(text)) => field["value"] = json!(text),
+                Some(Value::Number(number)) => field["value"] = json!(format!("{number} m")),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+    fields
 }
 
 /// The ends of a slider are the usual value divided by and multiplied by this factor.

@@ -117,7 +117,7 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
         ModelKind::VibroImpact
     };
     let physical = case.is_physical();
-    Key::all().filter(move |key| {
+    let of_table = Key::all().filter(move |key| {
         // Another kind of model is a separate case.
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
         // A table or a state has no control.
@@ -129,7 +129,8 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
         } else {
             takes && !curve
         }
-    })
+    });
+    of_table.chain(case.formula_keys())
 }
 
 fn knob(case: &Case, base: &Case, key: Key, accepts: Option<Accepts<'_>>) -> Knob {
@@ -309,8 +310,10 @@ fn range(case: &Case, key: Key, size: f64, factor: f64) -> Slider {
         Key::DriveFrequency | Key::DriveFrequencyRatio => DETUNED,
         _ => REACH,
     };
-    let signed = allowed.low < 0.0;
-    let zero = allowed.contains(0.0);
+    // A positive parameter of a formula may be of any size, and is not expected to change its sign.
+    let positive = case.get(key) > 0.0 && case.formula_keys().contains(&key);
+    let signed = allowed.low < 0.0 && !positive;
+    let zero = allowed.contains(0.0) && !positive;
     let log = !zero && !signed;
     let from = match (signed, zero) {
         (true, _) => -2.0 * size,

@@ -14,6 +14,9 @@ use crate::preset::CaseSpec;
 pub(crate) struct LawRequest {
     case: CaseSpec,
     law: String,
+    /// The changes of the case when it last had this law: their values return.
+    #[serde(default)]
+    former: Option<Vec<String>>,
 }
 
 /// The keys to set, empty where the law does not take them, and a sentence that says which.
@@ -26,7 +29,15 @@ pub(crate) fn changes(app: &Explorer, request: &LawRequest) -> Result<Value, Api
     };
     let about = |error: nanotap::Error| ApiError::of(error).about(key.path());
     let preset = request.case.preset(app)?;
-    let base = nanotap::case::Case::parse(Some(preset.source()), &preset.set)?;
+    let former = request.former.clone();
+    let former = former.and_then(|set| request.case.with_set(set).any_distance(app).ok());
+    let (base, origin) = match former {
+        Some(former) => (former, "as before"),
+        None => (
+            nanotap::case::Case::parse(Some(preset.source()), &preset.set)?,
+            "a usual value",
+        ),
+    };
     let change = case.law_change(&request.law, &base).map_err(about)?;
     let mut set = Map::new();
     set.insert(key.path().into(), change.law.clone().into());
@@ -41,7 +52,7 @@ pub(crate) fn changes(app: &Explorer, request: &LawRequest) -> Result<Value, Api
             Written::Table(_) | Written::Arms(_) | Written::LeverModes(_) => "rows to begin with",
             _ => &text,
         };
-        words.push(format!("with {key} = {shown}, a usual value"));
+        words.push(format!("with {key} = {shown}, {origin}"));
         set.insert(key.path().into(), text.into());
     }
     let words = match words.as_slice() {

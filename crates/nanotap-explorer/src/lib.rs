@@ -30,12 +30,15 @@
 mod answers;
 mod api_error;
 mod census;
+mod choice;
 mod clicks;
 mod commands;
 mod content;
+mod curve;
 mod export;
 mod figures;
 mod film;
+mod force;
 mod forms;
 mod knobs;
 mod law;
@@ -43,11 +46,15 @@ pub mod link;
 mod maps;
 mod motion;
 mod motion_request;
+mod open;
 pub mod page;
 mod preset;
 mod readout;
 mod report;
+mod row;
+mod states;
 mod study;
+mod upset;
 
 use std::sync::{Arc, Mutex};
 

@@ -6,6 +6,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use miniz_oxide::deflate::compress_to_vec;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 
 /// The address of the published page.
 pub const PAGE: &str = env!("CARGO_PKG_HOMEPAGE");
@@ -13,6 +14,8 @@ pub const PAGE: &str = env!("CARGO_PKG_HOMEPAGE");
 const VERSION: char = '1';
 /// Level of the compression.
 const LEVEL: u8 = 10;
+/// Characters that a field of a fragment escapes.
+const ESCAPED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_');
 
 /// The link that opens a case file in the page at an address.
 ///
@@ -25,6 +28,22 @@ const LEVEL: u8 = 10;
 pub fn link(page: &str, case: &str) -> String {
     let packed = URL_SAFE_NO_PAD.encode(compress_to_vec(case.as_bytes(), LEVEL));
     format!("{page}#case={VERSION}{packed}")
+}
+
+/// The link to a case with other values of keys: further fields of the fragment.
+///
+/// ```
+/// use nanotap_explorer::link::with_changes;
+///
+/// let link = with_changes("#case=1AA", &[("gap.tip", "9 nm")]);
+/// assert_eq!(link, "#case=1AA&set.gap.tip=9%20nm");
+/// ```
+pub fn with_changes(link: &str, set: &[(&str, &str)]) -> String {
+    let field = |(key, value): &(&str, &str)| {
+        let [key, value] = [key, value].map(|text| utf8_percent_encode(text, ESCAPED));
+        format!("&set.{key}={value}")
+    };
+    link.to_owned() + &set.iter().map(field).collect::<String>()
 }
 
 #[cfg(test)]

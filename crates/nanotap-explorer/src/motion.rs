@@ -272,6 +272,16 @@ pub(crate) fn shown(
     observable: &Observable,
     observables: &Observables,
 ) -> Option<String> {
+    shown_digits(case, observable, observables, 5)
+}
+
+/// The same with this number of digits.
+pub(crate) fn shown_digits(
+    case: &Case,
+    observable: &Observable,
+    observables: &Observables,
+    digits: usize,
+) -> Option<String> {
     let mut value = (observable.of)(observables).number()?;
     let balance = &observables.energy_balance;
     // A conservative force loses no energy.
@@ -287,9 +297,9 @@ pub(crate) fn shown(
         // Harmonics have their lags as in the data, in (−180°, 180°].
         (Dimension::Angle, _) if observable.name != "phase" => format!("{value:.2}°"),
         (Dimension::Angle, _) => format!("{:.2}°", shown_phase(value)),
-        (_, Some((kind, unit))) => kind.format_digits(unit * value, 5),
+        (_, Some((kind, unit))) => kind.format_digits(unit * value, digits),
         (_, None) => {
-            let number = Kind::Number.format_digits(value, 5);
+            let number = Kind::Number.format_digits(value, digits);
             // The numbers of an oscillator have the units of its equation, which are not named.
             match dimension.model_unit() {
                 _ if case.oscillator().is_some() => number,
@@ -317,7 +327,7 @@ fn fixed_step(
     request.state = state.map(Into::into);
     let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,
-        Ok(SimulateReport::Exact(_)) => return Ok(None),
+        Ok(SimulateReport::Exact(_) | SimulateReport::OneShot(_)) => return Ok(None),
         // With too few steps only the exact motion is shown.
         Err(error) => return Ok(Some(json!({ "words": error.to_string() }))),
     };

@@ -250,12 +250,26 @@ impl CaseSpec {
         Ok(solved.map_err(about)?.0)
     }
 
+    /// The same preset with other changes.
+    pub(crate) fn with_set(&self, set: Vec<String>) -> Self {
+        Self {
+            set,
+            ..self.clone()
+        }
+    }
+
     /// States a value in place of all that says the same.
     pub(crate) fn put(&mut self, key: Key, text: &str) {
         let same: Vec<&str> = key.alternatives().map(|(other, _)| other.path()).collect();
         let says = |word: &String| key_of(word) == key.path() || same.contains(&key_of(word));
         self.set.retain(|word| !says(word));
         self.set.push(format!("{}={text}", key.path()));
+    }
+
+    /// States a text for a key in place of what was stated for it; an empty one removes the key.
+    pub(crate) fn replace(&mut self, key: &str, text: &str) {
+        self.set.retain(|word| key_of(word) != key);
+        self.set.push(format!("{key}={text}"));
     }
 
     /// The case with one more change, if it has a model.
@@ -275,10 +289,7 @@ impl CaseSpec {
         if let Some(case) = solved.get() {
             return Ok(case.cancelled_by(control));
         }
-        let unchanged = Self {
-            set: Vec::new(),
-            ..self.clone()
-        };
+        let unchanged = self.with_set(Vec::new());
         // Other requests share it: it does not carry what cancels this one.
         let case = unchanged.at_setpoint(app, control)?;
         Ok(solved.get_or_init(|| case).cancelled_by(control))

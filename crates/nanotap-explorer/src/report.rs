@@ -47,17 +47,13 @@ pub(crate) fn table(title: &str, heads: &[(&str, &str)], rows: &[Value]) -> Valu
 
 /// A frame as a table with a title: the heads and cells of the terminal, with labels as their meanings.
 pub(crate) fn of_frame(title: &str, frame: &Frame<'_>) -> Value {
-    let columns = frame.shown_columns();
-    let titles: Vec<String> = columns.iter().map(|column| frame.head(column)).collect();
-    let heads = titles.iter().zip(&columns);
+    let shown = frame.shown(0..frame.rows.min(MAX_ROWS));
+    let heads = shown.heads.iter();
     let heads: Vec<(&str, &str)> = heads
-        .map(|(title, c)| (title.as_str(), &*c.label))
+        .map(|(head, meaning, _)| (head.as_str(), meaning.as_str()))
         .collect();
-    let rows = (0..frame.rows.min(MAX_ROWS)).map(|k| {
-        let cells: Vec<String> = columns.iter().map(|c| frame.text(c, k)).collect();
-        row(&cells, None)
-    });
-    table(title, &heads, &rows.collect::<Vec<_>>())
+    let rows: Vec<Value> = shown.rows.iter().map(|cells| row(cells, None)).collect();
+    table(title, &heads, &rows)
 }
 
 /// A row of cells. With changes to the case, a click on it makes them.

@@ -32,8 +32,8 @@ use tokio::sync::Notify;
 use crate::scratch::Scratch;
 use crate::work::Workers;
 
-/// Largest request, in bytes; a case file and its options are far smaller.
-const LONGEST_REQUEST: usize = 256 << 10;
+/// Largest request, in bytes: a case with the files that it names, escaped.
+const LONGEST_REQUEST: usize = 4 << 20;
 /// Largest request with measured data: four thirds of the largest file that the page takes.
 const LONGEST_DATA: usize = 34 << 20;
 

@@ -1,11 +1,13 @@
 //! Connections: as many as a browser needs, each with a limit of the time in which a request must
 //! arrive.
 
+use std::future::poll_fn;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use axum::body::Body;
+use axum::body::{Body, HttpBody as _};
 use axum::extract::Request;
 use axum::http::StatusCode;
 use axum::middleware::Next;
@@ -51,16 +53,16 @@ pub(crate) async fn listen(listener: &TcpListener, router: Router) {
 pub(crate) async fn whole(request: Request, next: Next) -> Response {
     let (head, body) = request.into_parts();
     let longest = match head.uri.path() {
-        "/api/study" | "/api/figure" => crate::LONGEST_DATA,
+        "/api/open" | "/api/study" | "/api/figure" => crate::LONGEST_DATA,
         _ => crate::LONGEST_REQUEST,
     };
-    let read = axum::body::to_bytes(body, longest);
-    match tokio::time::timeout(LONGEST_ARRIVAL, read).await {
-        Ok(Ok(bytes)) => next.run(Request::from_parts(head, Body::from(bytes))).await,
-        Ok(Err(_)) => {
+    match tokio::time::timeout(LONGEST_ARRIVAL, read(body, longest)).await {
+        Ok(Ok(Some(bytes))) => next.run(Request::from_parts(head, Body::from(bytes))).await,
+        Ok(Ok(None)) => {
             let words = format!("expected at most {longest} bytes in a request");
             (StatusCode::PAYLOAD_TOO_LARGE, words).into_response()
         }
+        Ok(Err(error)) => (StatusCode::BAD_REQUEST, error.to_string()).into_response(),
         Err(_) => {
             let words = format!(
                 "the request did not arrive in {} s",
@@ -69,4 +71,20 @@ pub(crate) async fn whole(request: Request, next: Next) -> Response {
             (StatusCode::REQUEST_TIMEOUT, words).into_response()
         }
     }
+}
+
+/// The bytes of a body; nothing if there are more than `longest`. The rest of such a body is read, too, and
+/// dropped: a client that still sends reads no answer.
+async fn read(mut body: Body, longest: usize) -> Result<Option<Vec<u8>>, axum::Error> {
+    let mut bytes = Some(Vec::new());
+    while let Some(frame) = poll_fn(|context| Pin::new(&mut body).poll_frame(context)).await {
+        let Ok(data) = frame?.into_data() else {
+            continue;
+        };
+        bytes = bytes.filter(|bytes| bytes.len() + data.len() <= longest);
+        if let Some(bytes) = &mut bytes {
+            bytes.extend_from_slice(&data);
+        }
+    }
+    Ok(bytes)
 }

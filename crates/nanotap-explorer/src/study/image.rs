@@ -4,7 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::file::scan_table;
 use nanotap::case::quantity::Kind;
 use nanotap::figure::scan::scan_figure;
-use nanotap::study::scan::ScanStudy;
+use nanotap::study::scan::{ScanReport, ScanStudy};
 use serde_json::{Map, Value, json};
 
 use super::{Stage, Studied, object};
@@ -18,6 +18,24 @@ impl Studied<'_> {
     /// A line over the surface of the form, under feedback.
     pub(super) fn image(&self) -> Result<(), ApiError> {
         let case = self.request.case.any_distance(self.app)?;
+        let options = self.scan_options();
+        let mut computed = options.clone();
+        let surface = self.surface()?;
+        computed.extend(surface.clone().unwrap_or_default());
+        let scanned = self.report::<ScanStudy>(&case, &computed)?;
+        self.hand(Stage {
+            figure: Some(scan_figure(&scanned)),
+            clicks: json!({}),
+            words: verdict(&scanned),
+            studies: &[("scan", &options)],
+            scan: Self::scan_table(&case, surface),
+            tables: vec![report::of_frame("lines", &scanned.line_table())],
+            ..Stage::default()
+        })
+    }
+
+    /// The options that the form's fields set.
+    pub(super) fn scan_options(&self) -> Map<String, Value> {
         let mut options = object(json!({ "lines": 1 }));
         for (field, option) in [
             ("size", "size"),
@@ -29,29 +47,11 @@ impl Studied<'_> {
                 options.insert(option.to_owned(), text.into());
             }
         }
-        let mut computed = options.clone();
-        let surface = self.surface()?;
-        computed.extend(surface.clone().unwrap_or_default());
-        let scanned = self.report::<ScanStudy>(&case, &computed)?;
-        let gain = scanned.feedback.as_ref();
-        let gain = gain.and_then(|feedback| feedback.largest_stable_gain);
-        let gain = gain.map_or_else(String::new, |gain| {
-            let gain = Kind::Number.format_digits(gain, 3);
-            format!(" The feedback is stable up to a gain of {gain}/s.")
-        });
-        self.hand(Stage {
-            figure: Some(scan_figure(&scanned)),
-            clicks: json!({}),
-            words: format!("{}{gain}", scanned.verdict),
-            studies: &[("scan", &options)],
-            scan: Self::scan_table(&case, surface),
-            tables: vec![report::of_frame("lines", &scanned.line_table())],
-            ..Stage::default()
-        })
+        options
     }
 
     /// The table `[scan]` that the saved case needs for another surface than its own.
-    fn scan_table(case: &Case, surface: Option<Map<String, Value>>) -> Option<String> {
+    pub(super) fn scan_table(case: &Case, surface: Option<Map<String, Value>>) -> Option<String> {
         let surface = surface?;
         let mut table = case.scan().cloned().unwrap_or_default();
         table.retain(|name, _| !["profile", "image"].contains(&name.as_str()));
@@ -60,7 +60,7 @@ impl Studied<'_> {
     }
 
     /// The surface of the form, as keys of `[scan]`; `None`: that of the case.
-    fn surface(&self) -> Result<Option<Map<String, Value>>, ApiError> {
+    pub(super) fn surface(&self) -> Result<Option<Map<String, Value>>, ApiError> {
         let [own, step, grating, particle, drawn] = forms::SURFACES;
         let chosen = self.field("surface")?;
         if chosen == own {
@@ -73,7 +73,10 @@ impl Studied<'_> {
         };
         let (height, line) = (length("height")?, length("size")?);
         let text = |value: f64| Kind::Length.format_exact(value);
-        let feature = if chosen == step {
+        let flat = json!({ "step": { "from": "0 m", "to": text(line), "height": "0 m" } });
+        let feature = if chosen == forms::FLAT {
+            flat
+        } else if chosen == step {
             json!({ "step": { "from": text(0.25 * line), "to": text(0.65 * line), "height": text(height) } })
         } else if chosen == grating {
             json!({ "grating": { "height": text(height), "period": text(0.25 * line) } })
@@ -89,7 +92,6 @@ impl Studied<'_> {
             })?;
             let heights: Vec<f64> = parts.iter().map(|part| part * height).collect();
             // A drawn surface has no features in addition.
-            let flat = json!({ "step": { "from": "0 m", "to": text(line), "height": "0 m" } });
             return Ok(Some(object(
                 json!({ "profile": heights, "surface": [flat] }),
             )));
@@ -102,4 +104,15 @@ impl Studied<'_> {
         };
         Ok(Some(object(json!({ "surface": [feature] }))))
     }
+}
+
+/// What a line shows, and the largest stable gain, in words.
+pub(super) fn verdict(scanned: &ScanReport) -> String {
+    let gain = scanned.feedback.as_ref();
+    let gain = gain.and_then(|feedback| feedback.largest_stable_gain);
+    let gain = gain.map_or_else(String::new, |gain| {
+        let gain = Kind::Number.format_digits(gain, 3);
+        format!(" The feedback is stable up to a gain of {gain}/s.")
+    });
+    format!("{}{gain}", scanned.verdict)
 }

@@ -34,6 +34,7 @@ impl Studied<'_> {
             let word = format!("{}={setpoint}", Key::DriveSetpoint);
             options.insert("set".into(), json!([word]));
         }
+        self.begins(LeverStudy::NAME, &options);
         let report = self.counting(LeverStudy::COUNTED, |control| {
             LeverStudy::run(&case, &read, control)
         })?;

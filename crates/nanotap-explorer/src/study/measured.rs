@@ -13,9 +13,8 @@ use nanotap::figure::reconstruct::reconstruct_figure;
 use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::approach::ApproachStudy;
-use nanotap::study::fit::{
-    FitMap, FitOptions, FitReport, FitStudy, FittedParameter, Table, measured,
-};
+use nanotap::study::fit::{FitMap, FitOptions, FitStudy, Table, measured};
+use nanotap::study::image_states::ImageData;
 use nanotap::study::reconstruct::{
     ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
 };
@@ -25,6 +24,8 @@ use nanotap_figures::{Axis as Axes, Colour, Figure, Markers, Panel};
 use serde_json::{Map, Value, json};
 
 use super::approach::{APPROACH, APPROACH_SHOWS, Approached};
+use super::calibrate::CALIBRATE;
+use super::image_states::IMAGE;
 use super::{NextStep, Stage, Studied, object};
 use crate::api_error::ApiError;
 use crate::clicks::Height;
@@ -53,6 +54,14 @@ impl Studied<'_> {
                 )
             })?),
         };
+        if self.field(CALIBRATE).is_ok() {
+            return self.calibrated(&case, name, bytes);
+        }
+        if self.field(IMAGE).is_ok() {
+            let images = ImageData::of_bytes(name, bytes)?;
+            let shown = self.states_of_image(&case, name, images);
+            return shown.or_else(|error| self.waiting_image(error));
+        }
         let options = |study| study_named(study).map_or_else(Map::new, |entry| self.options(entry));
         let of_fit = options(FitStudy::NAME);
         let mut named = object(json!({ "data": [name] }));
@@ -74,13 +83,29 @@ impl Studied<'_> {
             let map = request.of_map(name, files::read(name, bytes)?)?;
             return self.fitted_pixels(&case, &map, named);
         }
-        request.data = vec![Table::of_bytes(name, bytes, number)?];
         if let Some(number) = number {
             named.insert(CURVE.into(), number.into());
         }
         if !fits {
-            return self.over_model(&case, &request, &named);
+            let noise = bytes.clone();
+            let images = ImageData::of_bytes(name, bytes.clone()).ok();
+            let shown = Table::of_bytes(name, bytes, number)
+                .map_err(ApiError::of)
+                .and_then(|table| {
+                    request.data = vec![table];
+                    self.over_model(&case, &request, &named, images.is_some())
+                });
+            // What is no curve may be images, or the thermal noise of a lever.
+            return shown.or_else(|error| {
+                if let Some(images) = images {
+                    let shown = self.states_of_image(&case, name, images);
+                    return shown.or_else(|error| self.waiting_image(error));
+                }
+                let calibrated = self.calibrated(&case, name, noise);
+                calibrated.map_err(|_| error)
+            });
         }
+        request.data = vec![Table::of_bytes(name, bytes, number)?];
         if !request.pixels.is_empty() {
             return self.fitted_pixels(&case, &request, named);
         }
@@ -110,7 +135,7 @@ impl Studied<'_> {
             figure: Some(fit_figure(&report)),
             words: format!("{fits} {}", notes.join(". ")).trim_end().to_owned(),
             studies: &[("fit", &named)],
-            tables: vec![parameters(&report)],
+            tables: vec![report::of_frame("", &report.parameter_table())],
             found: Some(found),
             ..Stage::default()
         })
@@ -204,6 +229,7 @@ impl Studied<'_> {
         case: &Case,
         request: &FitOptions,
         named: &Map<String, Value>,
+        has_images: bool,
     ) -> Result<(), ApiError> {
         let data = measured(case, request)?;
         let swept = data.swept.first().map(|swept| swept.key);
@@ -273,10 +299,7 @@ impl Studied<'_> {
                 .label("measured");
             panel.layers.push(markers.into());
         }
-        let mut words = format!(
-            "{} rows. “Fit” finds the free parameters, “Force without a law” the force and the dissipation.",
-            data.rows().count()
-        );
+        let mut words = format!("{} rows.", data.rows().count());
         if !left.is_empty() {
             words.push_str(" Not drawn: ");
             words.push_str(&left.join(", "));
@@ -285,47 +308,10 @@ impl Studied<'_> {
             figure: Some(figure),
             words,
             studies: &[("fit", named)],
+            has_images,
             ..Stage::default()
         })
     }
-}
-
-/// The fitted parameters with their intervals.
-fn parameters(report: &FitReport) -> Value {
-    let text = |parameter: &FittedParameter, value: Option<f64>| match value {
-        None => "not determined".to_owned(),
-        Some(value) => {
-            let kind = Key::find(&parameter.key).map(Key::kind);
-            let kind = kind.or_else(|| Kind::of_si_unit(&parameter.unit));
-            kind.unwrap_or(Kind::Number).format_digits(value, 4)
-        }
-    };
-    let rows = report.parameters.iter().map(|one| {
-        let name = match &one.curve {
-            Some(curve) => format!("{} of {curve}", one.key),
-            None => one.key.clone(),
-        };
-        let [low, high] = one.interval.map(|end| text(one, end));
-        let cells = [
-            name,
-            text(one, Some(one.value)),
-            text(one, one.standard_error),
-            match one.interval {
-                [None, None] => "not determined".to_owned(),
-                _ => format!("{low} to {high}"),
-            },
-            text(one, Some(one.start)),
-        ];
-        report::row(&cells, None)
-    });
-    let heads = [
-        ("parameter", "Key of the case, or correction of a column"),
-        ("value", "Of the best fit"),
-        ("standard error", ""),
-        ("95 % interval", ""),
-        ("began at", "Initial value"),
-    ];
-    report::table("", &heads, &rows.collect::<Vec<_>>())
 }
 
 /// The values of a reconstruction.

@@ -2,12 +2,17 @@
 
 mod approach;
 mod basin;
+mod calibrate;
 mod diagram;
+mod estimate;
 mod image;
+mod image_states;
 mod levers;
+mod line;
 mod measured;
 mod plan;
 mod registered;
+mod wishes;
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -21,6 +26,7 @@ use nanotap::study::request::{Property, properties, read};
 use nanotap::study::sweep::Over;
 use nanotap_arithmetic::clock::Instant;
 use nanotap_figures::Figure;
+use schemars::Schema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -32,6 +38,7 @@ use crate::figures::{drawn, over_pinned};
 use crate::forms;
 use crate::motion_request::model_of;
 use crate::preset::CaseSpec;
+use estimate::Trial;
 
 /// Time between messages on the progress.
 const BETWEEN: Duration = Duration::from_millis(300);
@@ -57,6 +64,9 @@ pub(crate) struct StudyRequest {
     /// Whether the first stage is enough.
     #[serde(default)]
     quick: bool,
+    /// Whether the answer is how long the study takes, from a short trial.
+    #[serde(default)]
+    estimate: bool,
 }
 
 /// Computes a study, and sends its stages to the page as they come.
@@ -66,13 +76,18 @@ pub(crate) fn study(
     control: &Control<'_>,
     hand_over: HandOver<'_>,
 ) -> Result<(), ApiError> {
-    Studied {
+    let studied = Studied {
         app,
         request,
         control,
         hand_over,
+        trial: None,
+    };
+    if request.estimate {
+        studied.estimated();
+        return Ok(());
     }
-    .run()
+    studied.run()
 }
 
 /// Sends a message to the page.
@@ -84,6 +99,8 @@ struct Studied<'a> {
     request: &'a StudyRequest,
     control: &'a Control<'a>,
     hand_over: HandOver<'a>,
+    /// What a trial records; none for the study itself.
+    trial: Option<&'a Trial>,
 }
 
 /// A finished stage of a study: what the page shows then.
@@ -94,10 +111,20 @@ struct Stage<'a> {
     words: String,
     /// Names and requests of the studies in its figure.
     studies: &'a [Computed<'a>],
+    /// The equivalent command and lines of Python, if they take no case.
+    commands: Option<[String; 2]>,
+    /// The form that the page shows from now on, if it is another one.
+    form: Option<&'static str>,
     /// Additional lines of the case file: its table `[scan]`.
     scan: Option<String>,
     /// Tables that the page shows below the figure.
     tables: Vec<Value>,
+    /// The channels of a line, as numbers.
+    line: Option<Value>,
+    /// The states of a measured image.
+    image: Option<Value>,
+    /// Whether the measured file has images, too.
+    has_images: bool,
     found: Option<NextStep>,
 }
 
@@ -124,7 +151,9 @@ impl Studied<'_> {
             "resonance" => self.resonance(),
             "map" => self.map(),
             "plan" => self.plan(),
+            "wishes" => self.wishes(),
             "image" => self.image(),
+            "line" => self.line(),
             "branches" => self.branches(),
             "approach" => self.approach(),
             "basin" => self.basin(),
@@ -136,6 +165,9 @@ impl Studied<'_> {
 
     /// Runs work whose progress the page shows.
     fn counting<T>(&self, counted: &str, work: impl FnOnce(&Control<'_>) -> T) -> T {
+        if self.trial.is_some() {
+            return work(self.control);
+        }
         let last = Mutex::new(Instant::now());
         let progress = |done: usize, total: usize| {
             let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
@@ -152,7 +184,11 @@ impl Studied<'_> {
 
     /// The options of a study that the form sets to another value than the default.
     fn options(&self, entry: &StudyEntry) -> Map<String, Value> {
-        let schema = (entry.request)();
+        self.options_of(&(entry.request)())
+    }
+
+    /// The options with this schema that the form sets to another value than the default.
+    fn options_of(&self, schema: &Schema) -> Map<String, Value> {
         let given = |property: Property<'_>| {
             let text = self.field(property.name).ok()?;
             let pairs = property.schema["x-value"].as_str();
@@ -165,7 +201,7 @@ impl Studied<'_> {
             };
             (property.default() != Some(&value)).then(|| (property.name.to_owned(), value))
         };
-        properties(&schema).filter_map(given).collect()
+        properties(schema).filter_map(given).collect()
     }
 
     fn field(&self, name: &str) -> Result<&str, ApiError> {
@@ -186,6 +222,9 @@ impl Studied<'_> {
     }
 
     fn hand(&self, stage: Stage<'_>) -> Result<(), ApiError> {
+        if self.trial.is_some() {
+            return Ok(());
+        }
         let case = &self.request.case;
         let command = |(name, request): &Computed<'_>| study_command(self.app, case, name, request);
         let commands = stage.studies.iter().map(command);
@@ -210,8 +249,24 @@ impl Studied<'_> {
             },
             "python": study_python(self.app, case, stage.studies)?,
         });
+        if let Some([command, python]) = stage.commands {
+            message["command"] = command.into();
+            message["python"] = python.into();
+        }
+        if let Some(form) = stage.form {
+            message["form"] = form.into();
+        }
         if let Some(figure) = figure {
             message["figure"] = drawn(&figure)?;
+        }
+        if let Some(line) = stage.line {
+            message["line"] = line;
+        }
+        if let Some(image) = stage.image {
+            message["image"] = image;
+        }
+        if stage.has_images {
+            message["has_images"] = true.into();
         }
         if let Some(found) = stage.found {
             message["found"] = json!(found);
@@ -230,6 +285,7 @@ impl Studied<'_> {
     ) -> Result<T, ApiError> {
         let entry =
             study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
+        self.begins(name, request);
         let request = Value::Object(request.clone());
         let plan = entry.plan(case, request, self.control)?;
         dataset(&plan, self.control, use_it)
@@ -243,6 +299,14 @@ impl Studied<'_> {
         mut stage: impl FnMut(usize, usize) -> Result<(), ApiError>,
     ) -> Result<(), ApiError> {
         let finest = counts.last().copied().unwrap_or_default();
+        if let Some(trial) = self.trial {
+            for count in [counts.first().copied().unwrap_or_default(), finest] {
+                trial.stage(count);
+                // An interrupted stage is an error.
+                trial.ended(stage(count, finest).is_ok() && !self.control.is_cancelled());
+            }
+            return Ok(());
+        }
         for &count in counts {
             stage(count, finest)?;
             if self.request.quick || self.control.is_cancelled() {
@@ -265,6 +329,7 @@ impl Studied<'_> {
         case: &Case,
         options: &Map<String, Value>,
     ) -> Result<S::Report, ApiError> {
+        self.begins(S::NAME, options);
         let options: S::Options = read(Value::Object(options.clone()))?;
         Ok(S::run(case, &options, self.control)?)
     }

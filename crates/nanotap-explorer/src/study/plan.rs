@@ -12,7 +12,7 @@ use crate::forms;
 /// Numbers of values along each axis in the stages of a plan.
 const PLAN: [usize; 3] = [4, 8, 16];
 /// Initial states at each point of a plan.
-const PLAN_STARTS: usize = 4;
+pub(super) const PLAN_STARTS: usize = 4;
 
 impl Studied<'_> {
     /// Finds where, over two parameters, every motion meets the conditions of the form.
@@ -46,7 +46,17 @@ impl Studied<'_> {
     pub(super) fn conditions(&self) -> Result<Vec<String>, ApiError> {
         let mut wanted = Vec::new();
         if let Ok(force) = self.field("force") {
-            wanted.push(format!("F_max < {force}"));
+            let sign = if self.field("want").is_ok() {
+                "<="
+            } else {
+                "<"
+            };
+            wanted.push(format!("F_max {sign} {force}"));
+        }
+        // The view Plan asks in other words than the form.
+        if let Ok(want) = self.field("want") {
+            wanted.extend(forms::wish(want)?.map(str::to_owned));
+            return Ok(wanted);
         }
         match self.field("regime")? {
             forms::ANY => {}

@@ -27,6 +27,7 @@ impl Studied<'_> {
         model_of(&case)?;
         let options = self.options(entry);
         let request = Value::Object(options.clone());
+        self.begins(entry.name, &options);
         let schema = (entry.report)();
         let (figure, tables) = if entry.answer.is_some() {
             let answer = self.counting(entry.counted, |control| {

@@ -141,7 +141,9 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "The sweep with `condition` over both parameters: no-contact, one-period-1, "
             "second-state, subharmonic, irregular, undecided, or setpoint-unreached; `share` is the "
             "fraction of each. With `where`, `holds` says where the conditions hold; its attributes "
-            "have their share and the largest rectangle (`region`, JSON)."
+            "have their share and the largest rectangle (`region`, JSON). Where the case leaves its "
+            "distance to a setpoint: the number of `states` at the setpoint, their distances, phases and "
+            "the `step_height` between them over both parameters, with the `verdict` as an attribute."
         ),
     ),
     "basin": (
@@ -190,6 +192,16 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "`branch_changes` and the analysis of "
             "the feedback `loop`. With `out`, the lines are written into a dataset as they are "
             "finished (this needs `line_settle`), and a later call goes on with it."
+        ),
+    ),
+    "image-states": (
+        (THREADS, PROGRESS),
+        "StudyDataset",
+        (
+            "Over `y` (falling, as instruments count lines) and `x`: `state` (attractive, repulsive, free or "
+            "undecided), `probability`, `height`, `corrected`, `amplitude` and `phase`. The attributes hold "
+            "the `verdict`, the `reason` if the image is undecided, `phase_offset`, the `warnings`, and as "
+            "JSON the `states` of the case, the `steps` of the lever and the assignments that are `possible`."
         ),
     ),
     "lyapunov": (
@@ -335,6 +347,27 @@ array([0.0149, 2.8522, 4.4282])
 ... )
 >>> (1e9 * ds.height.sel(direction="trace")).values.round(1).tolist()
 [[7.7, 8.8, 9.7, 8.9, 7.7]]
+""",
+    "image-states": """
+>>> import numpy as np
+>>> lever = nanotap.Case(
+...     modes=1,
+...     cantilever={"k": "40 N/m", "f0": "325 kHz", "Q": 200},
+...     tip={"radius": "20 nm", "modulus": "170 GPa", "poisson": 0.28},
+...     sample={"law": "dmt", "modulus": "70 GPa", "poisson": 0.17, "hamaker": "1.2e-19 J"},
+...     drive={
+...         "actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm", "setpoint": 0.9,
+...     },
+... )
+>>> image = {
+...     "height (nm)": np.array([[9.2, 9.2, 9.2, 9.2, 8.9, 8.9, 8.9, 8.9]]),
+...     "phase (deg)": np.array([[115.9, 115.7, 115.8, 115.9, 64.2, 64.1, 64.3, 64.1]]),
+... }
+>>> ds = nanotap.image_states(lever, data=image, phase_offset=0, sense="lag", progress=False)
+>>> ds.state.values[0, 3:5].tolist()
+['attractive', 'repulsive']
+>>> (1e9 * ds.corrected).values[0, 3:5].round(2).tolist()
+[9.2, 9.2]
 """,
     "lever": """
 >>> gel = nanotap.Case(
@@ -533,6 +566,8 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
         return "Iterable[Any] | None"
     elif option == "state":
         return "Any"
+    elif option == "drive_signal":
+        return "str | Path | Mapping[str, Any] | None"
     elif "object" in known:
         kind = "Mapping[str, tuple[float | str, float | str]] | str"
     elif "integer" in known and "array" in known:
@@ -554,7 +589,7 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
 
 def python_default(declared: dict[str, Any]) -> str:
     default = declared.get("default")
-    if default == [] or (isinstance(default, str) and not default):
+    if isinstance(default, dict) or default in ([], ""):
         return "None"
     if isinstance(default, list) and len(set(default)) == 1:
         default = default[0]  # the same in both regimes

@@ -3,18 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use nanotap::case::document::{CaseDocument, MappingDocument};
+use nanotap::case::document::CaseDocument;
 use nanotap::case::file::{self, Source};
 use nanotap::case::key::{ModelKind, Section};
-use nanotap::case::physical::{Catalogue, Kind, Physical, Severity};
+use nanotap::case::physical::{Catalogue, Kind, Severity};
+use nanotap::case::quantity::Quantity;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::input::{self, MAX_CASE_BYTES, Origin};
 use nanotap::observe::time_series::state_names;
-use nanotap::study::setpoint::{SetpointReport, SolvedCase, at_setpoint};
+use nanotap::study::setpoint::{SetpointReport, SolvedCase, at_setpoint, case_tables};
 use pyo3::prelude::*;
+use serde_json::Value;
 
 use crate::failure::Failure;
+use crate::study::table_of;
 use crate::watch::watched;
 
 /// A checked case. It keeps the texts that it was made of, so that it can be made again with
@@ -296,18 +299,14 @@ impl CaseCore {
         Ok(report.transpose().map_err(Failure::from)?)
     }
 
-    /// Of a physical case, every parameter with its physical quantity, JSON, at the setpoint.
+    /// The tables of the case column by column, JSON, at the setpoint.
     #[getter]
-    fn mapping(&self, py: Python<'_>) -> PyResult<String> {
-        let case = self.studied(py)?;
-        let rows: Vec<MappingDocument> = case
-            .physical()
-            .map(Physical::mapping)
-            .into_iter()
-            .flatten()
-            .map(MappingDocument::from)
-            .collect();
-        Ok(serde_json::to_string(&rows).map_err(Failure::from)?)
+    fn tables(&self, py: Python<'_>) -> PyResult<String> {
+        let (case, report) = self.solved(py)?;
+        let mut frames = case_tables(case);
+        frames.extend(report.as_ref().map(SetpointReport::solution_table));
+        let tables: Vec<Value> = frames.iter().map(table_of).collect();
+        Ok(serde_json::to_string(&tables).map_err(Failure::from)?)
     }
 
     /// Assumptions (`note`) and warnings (`warning`) of a physical case.
@@ -412,9 +411,23 @@ pub(crate) fn case_keys() -> Vec<(&'static str, Vec<KeyRow>)> {
 /// A quantity of a key, given by its path, in SI; of another key a plain number.
 #[pyfunction]
 pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
-    let kind = Key::find(key).map_or(Kind::Number, Key::kind);
-    let read = kind.parse(text);
+    // A parameter of a formula has the kind of its value.
+    let own = text
+        .parse::<Quantity>()
+        .ok()
+        .filter(|_| Key::is_parameter(key));
+    let own = own.and_then(|read| Kind::of(read.dimension));
+    let kind = Key::find(key).map(Key::kind).or(own);
+    let read = kind.unwrap_or(Kind::Number).parse(text);
     Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
+}
+
+/// The SI unit of a quantity; empty for a pure number.
+#[pyfunction]
+pub(crate) fn si_unit_of(text: &str) -> &'static str {
+    let kind = text.parse::<Quantity>().ok();
+    let kind = kind.and_then(|read| Kind::of(read.dimension));
+    kind.and_then(Kind::dimensional).map_or("", Kind::si_unit)
 }
 
 /// A link that holds the text of a case file, to the published page or to another copy of it.

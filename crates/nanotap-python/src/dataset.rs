@@ -17,6 +17,7 @@ use nanotap::study::fit::{FitMap, FitOptions};
 use nanotap::study::registry;
 use nanotap::study::request::read;
 use nanotap::study::scan::ScanLines;
+use nanotap::study::setpoint_map;
 use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
@@ -258,6 +259,7 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
             "basin" => serde_json::to_string(&basin::shares(&store)?)?,
             "scan" => serde_json::to_string(&ScanLines::report(&store)?)?,
             "fit" => serde_json::to_string(&FitMap::report(&store)?)?,
+            setpoint_map::KIND => serde_json::to_string(&Window::of(&store)?)?,
             _ => serde_json::to_string(&Summary::of(&store)?)?,
         })
     };
@@ -274,7 +276,7 @@ pub(crate) fn window(path: PathBuf) -> PyResult<String> {
     Ok(window()?)
 }
 
-/// The figure of a finished dataset, as `svg`, `png` or `pdf`.
+/// The figure of a finished dataset, as `svg`, `png`, `pdf` or its description as `json`.
 #[pyfunction]
 pub(crate) fn figure<'py>(
     py: Python<'py>,
@@ -288,6 +290,7 @@ pub(crate) fn figure<'py>(
             "basin" => figures::basin::figure(&store)?,
             "scan" => figures::scan::scan_figure(&ScanLines::report(&store)?),
             "fit" => figures::fit::FitMaps::of(&store)?.figure(),
+            setpoint_map::KIND => figures::window::figure(&store)?,
             _ => figures::sweep::figure(&store)?,
         };
         drawn(&figure, &format)
@@ -300,9 +303,10 @@ fn drawn(figure: &Figure, format: &str) -> Result<Vec<u8>, Failure> {
         "svg" => figure.to_svg()?.into_bytes(),
         "png" => figure.to_png(200.0)?,
         "pdf" => figure.to_pdf()?,
+        "json" => figure.to_json()?.into_bytes(),
         other => {
             return Err(Failure::input(format!(
-                "unknown figure format `{other}`: expected svg, png or pdf"
+                "unknown figure format `{other}`: expected svg, png, pdf or json"
             )));
         }
     })

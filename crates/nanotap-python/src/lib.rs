@@ -45,6 +45,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(case::catalogue, module)?,
         wrap_pyfunction!(case::catalogue_text, module)?,
         wrap_pyfunction!(case::in_si, module)?,
+        wrap_pyfunction!(case::si_unit_of, module)?,
         wrap_pyfunction!(case::link, module)?,
         wrap_pyfunction!(case::label, module)?,
         wrap_pyfunction!(motion::modes, module)?,

@@ -9,11 +9,10 @@ use nanotap::case::Case;
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
-use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure};
 use nanotap::frame::{Form, Frame, Rows as FrameRows};
 use nanotap::map::MAX_NUMBERS;
+use nanotap::model::Model;
 use nanotap::model::beam::Modes;
-use nanotap::model::{Model, MotionError};
 use nanotap::observe::time_series::{self, state_names};
 use nanotap::observe::{Dimension, OBSERVABLES};
 use nanotap::study::in_si::InSi;
@@ -99,11 +98,12 @@ pub(crate) fn modes<'py>(
     Ok((ReportCore::new(answer), PyArray1::from_vec(py, xi), shapes))
 }
 
-fn rows(
+/// The numbers of a time series of so many drive periods, which `sample` passes row by row.
+fn rows<E: Into<Error>>(
     model: &Model,
-    start: &[f64],
     periods: usize,
     resolution: usize,
+    sample: impl FnOnce(&mut dyn FnMut(&[f64])) -> Result<(), E>,
 ) -> Result<Vec<f64>, Failure> {
     let numbers = periods
         .saturating_mul(resolution)
@@ -117,9 +117,7 @@ fn rows(
         )));
     }
     let mut values = Vec::new();
-    time_series::sample(model, start, periods, resolution, |row| {
-        values.extend_from_slice(row);
-    })?;
+    sample(&mut |row| values.extend_from_slice(row)).map_err(|error| Failure(error.into()))?;
     Ok(values)
 }
 
@@ -135,25 +133,35 @@ enum MotionReport {
 struct MotionAnswer {
     case: Arc<Case>,
     report: MotionReport,
-    resolution: usize,
+    options: MotionOptions,
+}
+
+/// The options of a run or an orbit.
+enum MotionOptions {
+    Run(Box<SimulateOptions>),
+    Orbit(OrbitOptions),
 }
 
 impl MotionAnswer {
-    fn series(&self, model: &Model) -> Result<Vec<Vec<f64>>, MotionError> {
-        let (start, periods) = match &self.report {
-            MotionReport::Run(SimulateReport::FixedStep(run)) => {
-                return Ok(run.curve.iter().map(|point| point.to_vec()).collect());
-            }
-            MotionReport::Run(SimulateReport::Exact(run)) => {
-                (&run.motion.start, run.motion.periods)
-            }
-            MotionReport::Orbit(orbit) => (&orbit.motion.state, orbit.motion.period),
-        };
+    /// The model of the motion and the rows of its time series.
+    fn series(&self) -> Result<(Model, Vec<Vec<f64>>), Error> {
+        let (case, model) = (&self.case, self.case.model()?);
         let mut rows = Vec::new();
-        time_series::sample(model, start, periods, self.resolution, |row| {
-            rows.push(row.to_vec());
-        })?;
-        Ok(rows)
+        let mut row = |row: &[f64]| rows.push(row.to_vec());
+        match (&self.report, &self.options) {
+            (MotionReport::Run(SimulateReport::FixedStep(run)), _) => {
+                run.curve.iter().for_each(|point| row(point));
+            }
+            (MotionReport::Run(run), MotionOptions::Run(options)) => {
+                run.sample(case, options, usize::MAX, &mut row)?;
+            }
+            (MotionReport::Orbit(orbit), MotionOptions::Orbit(options)) => {
+                let (start, periods) = (&orbit.motion.state, orbit.motion.period);
+                time_series::sample(&model, start, periods, options.resolution, row)?;
+            }
+            _ => {}
+        }
+        Ok((model, rows))
     }
 }
 
@@ -166,10 +174,8 @@ impl Answer for MotionAnswer {
     }
 
     fn frames(&self) -> Vec<Frame<'_>> {
-        let series = self.case.model().ok().and_then(|model| {
-            let rows = self.series(&model).ok()?;
-            Some(series_table(&model, rows, self.case.units()))
-        });
+        let series = self.series().ok();
+        let series = series.map(|(model, rows)| series_table(&model, rows, self.case.units()));
         let harmonics = match &self.report {
             MotionReport::Orbit(orbit) => OrbitStudy::frames(&self.case, orbit),
             MotionReport::Run(_) => Vec::new(),
@@ -178,16 +184,10 @@ impl Answer for MotionAnswer {
     }
 
     fn figure(&self) -> Option<Figure> {
-        let (model, units) = (self.case.model().ok()?, self.case.units());
-        Some(match &self.report {
-            MotionReport::Run(SimulateReport::Exact(run)) => {
-                simulation_figure(&model, &run.motion, &units)
-            }
-            MotionReport::Run(SimulateReport::FixedStep(run)) => {
-                fixed_step_figure(&model, run, &units)
-            }
-            MotionReport::Orbit(orbit) => orbit_figure(&model, &orbit.motion, &units),
-        })
+        match &self.report {
+            MotionReport::Run(run) => SimulateStudy::figure(&self.case, run),
+            MotionReport::Orbit(orbit) => OrbitStudy::figure(&self.case, orbit),
+        }
     }
 }
 
@@ -241,27 +241,32 @@ pub(crate) fn simulate<'py>(
     series_periods: usize,
 ) -> PyResult<(Bound<'py, PyAny>, Vec<Column>, ReportCore, Table<'py>)> {
     let case = case.studied(py)?;
-    let request: SimulateOptions = read(json(request)?).map_err(Failure::from)?;
+    let mut request: SimulateOptions = read(json(request)?).map_err(Failure::from)?;
+    if let Some(signal) = &mut request.drive_signal {
+        signal.read_file().map_err(Failure::from)?;
+    }
     let done = watched_alone(py, None, move |control| {
         let report = SimulateStudy::run(&case, &request, control)?;
-        let (names, values) = match &report {
-            SimulateReport::Exact(run) => {
-                let model = case.cancelled_by(control).model()?;
-                let start = &run.motion.start;
-                let values = rows(&model, start, series_periods, request.resolution)?;
-                (time_series::columns(&model), values)
-            }
-            SimulateReport::FixedStep(run) => {
-                let names = ["tau", "tip", "tip_rate"].map(str::to_owned).to_vec();
-                (names, run.curve.concat())
-            }
+        let (names, values) = if let SimulateReport::FixedStep(run) = &report {
+            let names = ["tau", "tip", "tip_rate"].map(str::to_owned).to_vec();
+            (names, run.curve.concat())
+        } else {
+            let case = case.cancelled_by(control);
+            let model = case.model()?;
+            let periods = match &report {
+                SimulateReport::OneShot(run) => run.motion.periods.ceil() as usize,
+                _ => series_periods,
+            };
+            let values = rows(&model, periods, request.resolution, |row| {
+                report.sample(&case, &request, series_periods, row)
+            })?;
+            (time_series::columns(&model), values)
         };
         let (document, report) = (document(&report)?, MotionReport::Run(report));
-        let resolution = request.resolution;
         let answer = MotionAnswer {
             case,
             report,
-            resolution,
+            options: MotionOptions::Run(Box::new(request)),
         };
         Ok((document, answer, names, values))
     })?;
@@ -285,13 +290,12 @@ pub(crate) fn orbit<'py>(
     let work = move |control: &Control<'_>| {
         let found = OrbitStudy::run(&case, &request, control)?;
         let (document, report) = (document(&found)?, MotionReport::Orbit(Box::new(found)));
-        let resolution = request.resolution;
         Ok((
             document,
             MotionAnswer {
                 case,
                 report,
-                resolution,
+                options: MotionOptions::Orbit(request),
             },
         ))
     };
@@ -316,7 +320,9 @@ pub(crate) fn series<'py>(
     let studied = case.studied(py)?;
     let done = watched_alone(py, None, move |control| {
         let model = studied.cancelled_by(control).model()?;
-        let values = rows(&model, &state, periods, resolution)?;
+        let values = rows(&model, periods, resolution, |row| {
+            time_series::sample(&model, &state, periods, resolution, row)
+        })?;
         Ok((time_series::columns(&model), values))
     })?;
     let (names, values) = done.result;

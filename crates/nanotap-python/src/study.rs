@@ -85,7 +85,7 @@ impl ReportCore {
 }
 
 /// A table, column by column as in its CSV file.
-fn table_of(frame: &Frame<'_>) -> Value {
+pub(crate) fn table_of(frame: &Frame<'_>) -> Value {
     let column = |column: &Column<'_>| {
         let value = |row| match frame.cell(column, row) {
             Cell::Empty => Value::Null,
@@ -194,19 +194,10 @@ pub(crate) fn calibrate(
                 calibrate_table(&table, &options)?
             }
         };
-        let columns: Vec<Value> = (report.columns().into_iter())
-            .map(|column| {
-                json!({
-                    "name": column.name,
-                    "label": column.label,
-                    "unit": column.unit,
-                    "values": column.values,
-                })
-            })
-            .collect();
+        let table = report.spectrum_table();
         let shown = json!({
-            "tables": { "spectrum": columns },
-            "csv": report.csv(),
+            "tables": { "spectrum": table_of(&table)["columns"] },
+            "csv": table.csv(),
             "figure": report.figure().to_json()?,
         });
         Ok((serde_json::to_string(&report)?, shown.to_string()))

@@ -2,7 +2,7 @@
 
 A `Case` describes cantilever, sample and drive. There is a function for every command of the
 terminal: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`, `branch`, `approach`,
-`fm`, `force_curve`, `lever`, `scan`, `calibrate`, `fit`, `fit_map`, `reconstruct`, `window`, `lyapunov`, `convergence`,
+`fm`, `force_curve`, `lever`, `scan`, `calibrate`, `fit`, `fit_map`, `reconstruct`, `image_states`, `window`, `lyapunov`, `convergence`,
 `contact_laws`, `paper`, `merge`. Results are xarray Datasets, objects and lists of objects, with the names of the terminal's
 JSON. A `Map` is the exact stroboscopic map, for your own algorithms.
 

@@ -309,6 +309,10 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
     kinds = takes.kinds
     if name == "state":
         return state(value)
+    if name == "data":
+        return value
+    if name == "drive_signal":
+        return value if isinstance(value, str) else tables(value)[0]
     if "string" in kinds:
         value = written(value)
     if "boolean" in kinds:

@@ -12,6 +12,7 @@ import numpy as np
 from . import _nanotap
 from ._quantity import in_si, si_unit, text, written
 from ._record import Record
+from ._report import frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +24,7 @@ Scalar: TypeAlias = "float | str | np.floating[Any] | np.integer[Any] | None"
 Table: TypeAlias = (
     "pd.DataFrame | Mapping[str, Iterable[float]] | Iterable[Iterable[float | str]]"
 )
-Value: TypeAlias = "Scalar | Mapping[str, Scalar | Table]"
+Value: TypeAlias = "Scalar | Mapping[str, Scalar | Table | Mapping[str, Scalar]]"
 
 _OTHER_NAMES = {
     alias: name
@@ -61,6 +62,9 @@ class Case:
     is the path of a CSV file, or its columns as a dictionary or a pandas table with units in the
     names: `{"gap (nm)": […], "force (nN)": […]}`; so are relaxing arms (`arms`, `relaxation_arms`). Measured
     modes are dictionaries: `cantilever={"mode": [{"f": "48.9 kHz", "k": "0.9 N/m", "Q": 255}, …]}`.
+    A force of your own is a formula of the gap `d` and its rate `v` with its parameters:
+    `sample={"law": "formula", "force": "k*max(-d, 0) - c*v", "parameters": {"k": "5 N/m", "c": 1e-7}}`;
+    `sample_force="…"` is short for law and force.
 
     >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
     2.6
@@ -181,6 +185,12 @@ class Case:
             return self
         source, _, catalogues, folder = self._core.made_of
         new = key_words(keys, self.kind)
+        for name in new.keys() & set(self._own_parameters):
+            # A number without a unit has that of the parameter.
+            number = new[name].partition("=")[2]
+            if number and not number.startswith('"'):
+                unit = _nanotap.si_unit_of(str(self[name]))
+                new[name] = f"{name}={number} {unit}".rstrip()
         replaced = _FIX_THE_DISTANCE if _FIX_THE_DISTANCE & new.keys() else set()
         kept = {key: text for key, text in self._keys.items() if key not in replaced}
         return _again(
@@ -278,8 +288,17 @@ class Case:
         import pandas as pd
 
         columns = ["parameter", "value", "formula", "quantity", "si", "unit"]
-        table = pd.DataFrame(json.loads(self._core.mapping), columns=columns)
-        return table.set_index("parameter")
+        table = self.tables.get("mapping", pd.DataFrame(columns=columns))
+        return table[columns].set_index("parameter")
+
+    @property
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """The tables that `nanotap case` prints: `numbers` of a dimensionless case; of a physical one
+        `mapping`, `equilibria` where the sample attracts, and `solutions` where the distance is left
+        to a setpoint, which is solved for.
+        """
+        found = json.loads(self._core.tables)
+        return {one["name"]: frame(one["columns"]) for one in found}
 
     def to_toml(self, *, dimensionless: bool = False) -> str:
         """The case file, which gives the same bytes of every result: a physical case with its units,
@@ -356,10 +375,12 @@ class Case:
         tables = self._tables
         if name in tables:
             return Record(tables[name])
-        table, _, key = name.partition(".")
-        if key not in tables.get(table, {}):
-            raise KeyError(name)
-        return tables[table][key]
+        found: Any = tables
+        for part in name.split("."):
+            if not isinstance(found, dict) or part not in found:
+                raise KeyError(name)
+            found = found[part]
+        return found
 
     @property
     def _tables(self) -> dict[str, Any]:
@@ -371,7 +392,14 @@ class Case:
 
     def _ipython_key_completions_(self) -> list[str]:
         tables = self._tables.items()
-        return [*self, *(f"{table}.{key}" for table, keys in tables for key in keys)]
+        named = [f"{table}.{key}" for table, keys in tables for key in keys]
+        return [*self, *named, *self._own_parameters]
+
+    @property
+    def _own_parameters(self) -> list[str]:
+        """The paths of the parameters of a formula."""
+        own = self._tables.get("sample", {}).get("parameters", {})
+        return [f"{_PARAMETERS}{key}" for key in own]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._document)
@@ -513,7 +541,16 @@ def key_words(keys: Mapping[str, Any], kind: str = "cantilever") -> dict[str, st
         if isinstance(value, Mapping):
             for inner, quantity in value.items():
                 name = f"{key}.{inner}"
-                words[name] = f"{name}={_written(name, quantity)}"
+                if f"{name}." == _PARAMETERS and isinstance(quantity, Mapping):
+                    for own, number in quantity.items():
+                        words[name + "." + own] = (
+                            f"{name}.{own}={_written(f'{name}.{own}', number)}"
+                        )
+                else:
+                    words[name] = f"{name}={_written(name, quantity)}"
+        elif key == "sample_force":
+            words["sample.law"] = "sample.law=formula"
+            words["sample.force"] = f"sample.force={_written(key, value)}"
         else:
             name = key.removeprefix("model.")
             name = second_names.get(name, name)
@@ -526,6 +563,9 @@ def key_words(keys: Mapping[str, Any], kind: str = "cantilever") -> dict[str, st
             words[name] = f"{name}={_written(name, value)}"
     return words
 
+
+#: What precedes the name of a formula's parameter.
+_PARAMETERS = "sample.parameters."
 
 #: Keys that take rows, as lists or as columns.
 TABLES = {
@@ -546,7 +586,7 @@ def _written(name: str, value: Any) -> str:
     if name.startswith("scan."):
         # Options of the study `scan`, as JSON.
         return json.dumps(value)
-    value = in_si(name, value)
+    value = written(value) if name.startswith(_PARAMETERS) else in_si(name, value)
     if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:
         value = value.item()
     if isinstance(value, str):

@@ -205,7 +205,10 @@ def window(
         stopped = _work(recipe, plan, "values", store, "1/1", threads, client, progress)
         ds = read(store, stopped)
         found = json.loads(_nanotap.window(store))
-    dims = ds.classification.dims[:2]
+        if (setpoint := found.get("setpoint")) is not None:
+            figure = _nanotap.figure(store, "json").decode()
+            ds = ds.assign_attrs(verdict=setpoint["verdict"], figure=figure)
+    dims = ds[next(iter(ds.data_vars))].dims[:2]
     shares = found["shares"]
     if (targets := found.get("targets")) is not None:
         ds = _judged(ds, dims, targets)

@@ -97,13 +97,15 @@ class Answered:
         answer = self._known()
         variables: dict[str, Any] = {}
         for table, columns in answer.tables.items():
+            by_row = any(column["name"] == "unit" for column in columns)
             for column in columns:
                 own = column["name"]
                 key = f"{table}_{own}" if own in variables else own
                 attrs = {"units": column["unit"] or "1", "long_name": column["label"]}
                 values = _values(column)
                 is_text = bool(values) and isinstance(values[0], str)
-                if is_text:
+                # Of numbers with a unit a row, the column `unit` says it.
+                if is_text or (by_row and not column["unit"]):
                     del attrs["units"]
                 variables[key] = (table, values, attrs)
         # A file has no other place for it.

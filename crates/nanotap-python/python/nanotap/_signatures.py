@@ -27,6 +27,7 @@ __all__ = [
     "fit",
     "fm",
     "force_curve",
+    "image_states",
     "lever",
     "lyapunov",
     "modes",
@@ -88,6 +89,7 @@ def simulate(
     method: Literal["exact", "rk4"] = "exact",
     steps: int | Sequence[int] = 200,
     switching: Literal["step", "stage"] = "step",
+    drive_signal: str | Path | Mapping[str, Any] | None = None,
     series: int | None = None,
     threads: int | None = None,
     progress: Progress = None,
@@ -128,6 +130,10 @@ def simulate(
     switching : Literal["step", "stage"]
         For rk4: where within a step the regime is checked; `step`: Once a step;
         `stage`: At every stage of a step.
+    drive_signal : str | Path | Mapping[str, Any] | None
+        Signal of one shot in place of the periodic drive: "pulse 5us", "chirp 60kHz
+        90kHz 5ms", "sinc 200kHz 1ms times 40", or a file with the columns time and
+        drive; its 1 is the case's drive. Then `periods` counts those after its end.
     series : int | None
         Number of periods of the time series, from the start of the recording;
         default: all, up to 100.
@@ -981,6 +987,9 @@ def window(
     second-state, subharmonic, irregular, undecided, or setpoint-unreached; `share`
     is the fraction of each. With `where`, `holds` says where the conditions hold;
     its attributes have their share and the largest rectangle (`region`, JSON).
+    Where the case leaves its distance to a setpoint: the number of `states` at the
+    setpoint, their distances, phases and the `step_height` between them over both
+    parameters, with the `verdict` as an attribute.
 
     Raises
     ------
@@ -1513,6 +1522,119 @@ def scan(
     """
     options = _arguments.options("scan", locals())
     return _studies.scan(case, options, out, chunk, threads, client, progress)
+
+def image_states(
+    case: Case,
+    *,
+    data: Any = None,
+    setpoint: float | str | None = None,
+    direction: Literal["trace", "retrace"] = "trace",
+    height: str | None = None,
+    amplitude: str | None = None,
+    phase: str | None = None,
+    convert: Sequence[str] | None = None,
+    phase_offset: float | None = None,
+    sense: Literal["lag", "lead"] | None = None,
+    amplitude_noise: float | str | None = None,
+    phase_noise: float | None = None,
+    phase_tolerance: float = 1.0,
+    amplitude_error: bool = True,
+    materials: bool = False,
+    confidence: float = 0.99,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> "StudyDataset":
+    """The lever's state in each pixel of an image, and the false steps of its height.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    data : Any
+        Images of one area: channels of height, amplitude and phase.
+    setpoint : float | str | None
+        Amplitude at which the image was taken, as a fraction of A0 or as in "8 nm";
+        default: drive.setpoint of the case, or the setpoint of its [scan].
+    direction : Literal["trace", "retrace"]
+        Direction of the lines, where a file has both; `trace`: Lines of the trace,
+        forward; `retrace`: Lines of the retrace, backward.
+    height : str | None
+        Channel of the height, by its name or a part of it, or none; default: by the
+        name.
+    amplitude : str | None
+        Channel of the amplitude, or of its error from the setpoint, or none;
+        default: by the name.
+    phase : str | None
+        Channel of the phase, or none; default: by the name.
+    convert : Sequence[str] | None
+        Conversions of channels, as in Amplitude="58 nm/V" or Phase=90-x.
+    phase_offset : float | None
+        Measured phase where the lag is zero, degrees; default: from the image.
+    sense : Literal["lag", "lead"] | None
+        Whether the measured phase is a lag or a lead; default: what the image
+        allows.
+    amplitude_noise : float | str | None
+        Noise of the amplitude in a pixel, as in "20 pm"; default: from neighbouring
+        pixels.
+    phase_noise : float | None
+        Noise of the phase in a pixel, degrees; default: from neighbouring pixels.
+    phase_tolerance : float
+        Error of the phases of the case, degrees.
+    amplitude_error : bool
+        Take the deviation of the amplitude from the setpoint from the heights, too:
+        it is the part of the surface, and of a false step, that the feedback has
+        not followed yet.
+    materials : bool
+        Look for the states above each material of the case's [scan], too: a pixel
+        then has a state and a material, and is undecided if two have its phase.
+    confidence : float
+        Probability above which a pixel is assigned to a state.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    Over `y` (falling, as instruments count lines) and `x`: `state` (attractive,
+    repulsive, free or undecided), `probability`, `height`, `corrected`, `amplitude`
+    and `phase`. The attributes hold the `verdict`, the `reason` if the image is
+    undecided, `phase_offset`, the `warnings`, and as JSON the `states` of the case,
+    the `steps` of the lever and the assignments that are `possible`.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> import numpy as np
+    >>> lever = nanotap.Case(
+    ...     modes=1,
+    ...     cantilever={"k": "40 N/m", "f0": "325 kHz", "Q": 200},
+    ...     tip={"radius": "20 nm", "modulus": "170 GPa", "poisson": 0.28},
+    ...     sample={"law": "dmt", "modulus": "70 GPa", "poisson": 0.17, "hamaker": "1.2e-19 J"},
+    ...     drive={
+    ...         "actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm", "setpoint": 0.9,
+    ...     },
+    ... )
+    >>> image = {
+    ...     "height (nm)": np.array([[9.2, 9.2, 9.2, 9.2, 8.9, 8.9, 8.9, 8.9]]),
+    ...     "phase (deg)": np.array([[115.9, 115.7, 115.8, 115.9, 64.2, 64.1, 64.3, 64.1]]),
+    ... }
+    >>> ds = nanotap.image_states(lever, data=image, phase_offset=0, sense="lag", progress=False)
+    >>> ds.state.values[0, 3:5].tolist()
+    ['attractive', 'repulsive']
+    >>> (1e9 * ds.corrected).values[0, 3:5].round(2).tolist()
+    [9.2, 9.2]
+    """
+    options = _arguments.options("image-states", locals())
+    return _studies.image_states(case, options, threads, progress)
 
 def force_curve(
     case: Case,

@@ -401,6 +401,53 @@ def _of_ways(report: Mapping[str, Any], ways: list[str], name: str) -> list[Any]
 
 
 @stoppable()
+def image_states(
+    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+) -> "StudyDataset":
+    """State, probability and corrected height over line and pixel."""
+    from ._images import image_data
+    from ._study_dataset import StudyDataset
+
+    if options["data"] is None:
+        message = "data: an image is needed"
+        raise TypeError(message)
+    asked = {**options, "data": image_data(options["data"])}
+    if options["convert"] is not None:
+        asked["convert"] = _arguments.names("convert", options["convert"])
+    report, answer, _, interrupted = _run(
+        "image-states", case, asked, threads, progress
+    )
+    images = report.pop("images")
+    names = [*(state["name"] for state in report["states"]), "undecided"]
+    variables: dict[str, Any] = {}
+    for name, rows in images.items():
+        if rows is None:
+            continue
+        attrs = declared("image-states", "StateImages")[name]
+        values = np.array(rows, dtype=float)
+        if name == "state":
+            known = np.where(np.isnan(values), len(names) - 1, values).astype(int)
+            values, attrs = np.array(names)[known], {"long_name": attrs["long_name"]}
+        variables[name] = (("y", "x"), values, attrs)
+    points, lines = report["shape"]
+    width, height = report["size"] or (points, lines)
+    unit = {"units": "m"} if report["size"] else {}
+    coords: dict[str, Any] = {
+        "x": ("x", (np.arange(points) + 0.5) * width / points, unit),
+        # Lines begin at the top.
+        "y": ("y", (np.arange(lines)[::-1] + 0.5) * height / lines, unit),
+    }
+    ds = StudyDataset(variables, coords)
+    ds.attrs.update(case_attributes(case, "image-states"))
+    describe(ds)
+    for name, value in report.items():
+        if value is not None:
+            as_it_is = isinstance(value, str | float) and not isinstance(value, bool)
+            ds.attrs[name] = value if as_it_is else json.dumps(value)
+    return _finished(ds.answered_by(answer), interrupted)
+
+
+@stoppable()
 def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     """The exponents, and the points of the section as a Dataset."""
     import xarray as xr

@@ -729,6 +729,8 @@ def show(result: Any, **options: Any) -> "Figure":
     for name, draw_it in _FIGURES_BY_VARIABLE.items():
         if name in getattr(result, "variables", ()):
             return draw_it(result, **options)
+    if (figure := _whole(result)) is not None:
+        return draw(figure, **options)
     message = f"there is no figure for a {type(result).__name__}"
     raise TypeError(message)
 

@@ -19,15 +19,24 @@ SIZE = {"width": 1440, "height": 900}
 
 def idle(page: Any) -> None:
     """Waits until the page shows the motion."""
-    page.wait_for_selector("td[data-observable=amplitude]")
+    page.wait_for_selector("td[data-observable=amplitude]", state="attached")
     page.wait_for_selector("body[data-busy=no]", timeout=120_000)
 
 
 def opened(page: Any, address: str, fragment: str) -> None:
     """Opens the page with the case and the study of `fragment`."""
     page.goto("about:blank")
-    page.goto(f"{address}#{fragment}")
+    page.goto(f"{address}#view=studies&{fragment}")
     idle(page)
+
+
+def states(page: Any, address: str) -> None:
+    """The first view, with the repulsive state chosen."""
+    page.goto(address)
+    page.wait_for_selector("#sure:has-text('Searched from')", timeout=120_000)
+    page.click("#rows tr[data-state=repulsive] .name")
+    page.wait_for_selector("#margin:has-text('knock')", timeout=120_000)
+    taken(page, "explorer-states.png")
 
 
 def compute(page: Any) -> None:
@@ -90,6 +99,7 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=chromium, args=flags)
         page = browser.new_page(viewport=SIZE)
         try:
+            states(page, address)
             coexisting(page, address)
             resonance(page, address)
         finally:

@@ -16,6 +16,9 @@ const FLAGS: &str = "-Ctarget-feature=+simd128,+relaxed-simd";
 /// Debian's compiler of the version that its browsers are built with, and the sources of its library.
 const PACKAGES: [&str; 2] = ["rustc-web", "rust-web-src"];
 
+/// The oldest compiler that nanotap is built with.
+const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
+
 /// Nothing was checked.
 pub(crate) const SKIPPED: Tally = Tally {
     passed: 0,
@@ -122,7 +125,24 @@ fn compiler(workspace: &Workspace) -> Result<Option<Compiler>, String> {
     if !rustc.exists() && !unpacked(&folder, &rustc)? {
         return Ok(None);
     }
+    let release = output(&workspace.root, Command::new(&rustc).arg("--version"));
+    let release = release.as_deref().and_then(|text| text.split(' ').nth(1));
+    if release.is_none_or(|release| version(release) < version(OLDEST)) {
+        println!(
+            "Debian's compiler is {}, and nanotap needs {OLDEST}: `apt-get update` renews the list of packages",
+            release.unwrap_or("none that runs")
+        );
+        fs::remove_dir_all(&folder)
+            .map_err(|error| format!("cannot remove {}: {error}", folder.display()))?;
+        return Ok(None);
+    }
     Ok(Some(Compiler { rustc: Some(rustc) }))
+}
+
+/// The numbers of a version, to compare it.
+fn version(text: &str) -> Vec<u32> {
+    let parts = text.split(['.', '-', '+']);
+    parts.map_while(|part| part.parse().ok()).collect()
 }
 
 /// Downloads Debian's compiler and unpacks it in a folder: it is not installed, and nothing else on the

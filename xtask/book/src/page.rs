@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
+use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 
 use crate::formula::typeset;
 
@@ -22,6 +22,8 @@ pub(crate) struct Page {
     pub(crate) anchors: Vec<String>,
     /// Links and pictures, in order.
     pub(crate) links: Vec<Link>,
+    /// The byte range of each block of commands, fences included.
+    consoles: Vec<Range<usize>>,
     /// The MathML of each formula and the byte range that it replaces.
     formulas: Vec<(Range<usize>, String)>,
     /// Formulas that cannot be typeset and texts with an unmatched `$`, each with the reason.
@@ -33,6 +35,7 @@ impl Page {
         let options = Options::ENABLE_TABLES | Options::ENABLE_FOOTNOTES | Options::ENABLE_MATH;
         let (mut anchors, mut links) = (Vec::new(), Vec::new());
         let (mut formulas, mut unreadable) = (Vec::new(), Vec::new());
+        let mut consoles = Vec::new();
         let mut in_block = false;
         let mut heading: Option<String> = None;
         let mut times: HashMap<String, usize> = HashMap::new();
@@ -48,7 +51,12 @@ impl Page {
                     });
                     *before += 1;
                 }
-                Event::Start(Tag::CodeBlock(_)) => in_block = true,
+                Event::Start(Tag::CodeBlock(kind)) => {
+                    in_block = true;
+                    if matches!(kind, CodeBlockKind::Fenced(of) if &*of == "console") {
+                        consoles.push(range);
+                    }
+                }
                 Event::End(TagEnd::CodeBlock) => in_block = false,
                 // An escaped character is literal.
                 Event::Text(words)
@@ -81,19 +89,26 @@ impl Page {
             text,
             anchors,
             links,
+            consoles,
             formulas,
             unreadable,
         }
     }
 
-    /// The page for mdBook: formulas in MathML, link targets replaced by `moved`, and what `further` gives
-    /// after a link.
+    /// The page for mdBook: formulas in MathML, link targets replaced by `moved`, what `further` gives
+    /// after a link, and what `done` gives, as a paragraph of its own, after a block of commands.
     pub(crate) fn written(
         &self,
         moved: impl Fn(&str) -> Option<String>,
         further: impl Fn(&str) -> Option<String>,
+        done: impl Fn(&str) -> Option<String>,
     ) -> String {
         let mut changes = self.formulas.clone();
+        for block in &self.consoles {
+            if let Some(words) = done(&self.text[block.clone()]) {
+                changes.push((block.end..block.end, format!("\n\n{words}")));
+            }
+        }
         for link in &self.links {
             if let Some(words) = further(&link.target) {
                 changes.push((link.range.end..link.range.end, words));
@@ -109,13 +124,13 @@ impl Page {
             }
         }
         changes.sort_by_key(|(range, _)| range.start);
-        let (mut text, mut done) = (String::with_capacity(self.text.len()), 0);
+        let (mut text, mut at) = (String::with_capacity(self.text.len()), 0);
         for (range, new) in changes {
-            text.push_str(&self.text[done..range.start]);
+            text.push_str(&self.text[at..range.start]);
             text.push_str(&new);
-            done = range.end;
+            at = range.end;
         }
-        text.push_str(&self.text[done..]);
+        text.push_str(&self.text[at..]);
         text
     }
 }
@@ -141,18 +156,24 @@ mod tests {
 
     #[test]
     fn formulas_and_links_are_found_and_changed_where_they_stand() {
-        let text =
-            "# A `b` c!\n\nSee [x](y/README.md#z), $a_1$ and\n\n```\n$ no [l](m)\n```\n\n# A b c\n";
+        let text = "# A `b` c!\n\nSee [x](y/README.md#z), $a_1$ and\n\n```\n$ no [l](m)\n```\n\n# A b c\n\n\
+             ```console\n$ do\ndone\n```\n\nend\n";
         let page = Page::read(text.to_owned());
         assert_eq!(page.anchors, ["a-b-c", "a-b-c-1"]);
         assert_eq!(page.links.len(), 1);
         let further = |target: &str| target.ends_with("#z").then(|| " (more)".to_owned());
-        let written = page.written(|target| Some(target.replace("README", "index")), further);
+        let done = |block: &str| block.contains("$ do\n").then(|| "next".to_owned());
+        let written = page.written(
+            |target| Some(target.replace("README", "index")),
+            further,
+            done,
+        );
         assert!(
             written.contains("[x](y/index.md#z) (more), <math"),
             "{written}"
         );
         assert!(written.contains("$ no [l](m)"), "{written}");
+        assert!(written.ends_with("done\n```\n\nnext\n\nend\n"), "{written}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::fmt;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use nanotap_explorer::link::link;
+use nanotap_explorer::link::{link, with_changes};
 use nanotap_paper::Report;
 
 use crate::page::Page;
@@ -28,6 +28,10 @@ const AT_ROOT: &[&str] = &[
 /// with the site, from a report that takes minutes.
 const STATEMENTS: &str = "  - [Every statement of the paper](reference/paper.md)\n";
 const BEFORE_STATEMENTS: &str = "](paper.md)\n";
+
+/// Folder of the tutorials, and of the worked cases that they take up.
+const TUTORIALS: &str = "docs/tutorials/";
+const CASES: &str = "docs/cases";
 
 /// Folder of the pictures of the report on the paper.
 const PICTURES: &str = "docs/reference/paper/";
@@ -167,10 +171,15 @@ impl Site {
                 Some(renamed(&target).unwrap_or(target))
             },
             |_| None,
+            |_| None,
         );
         put(folder, "SUMMARY.md", summary.as_bytes())?;
         for (name, page) in &self.pages {
-            let text = page.written(renamed, |target| self.live(name, target));
+            let text = page.written(
+                renamed,
+                |target| self.live(name, target),
+                |block| self.step(name, block),
+            );
             put(
                 folder,
                 &renamed(name).unwrap_or_else(|| name.clone()),
@@ -191,17 +200,39 @@ impl Site {
         Ok(())
     }
 
-    /// The pages in the summary, from the repository's root.
     /// The link that opens a case file in the page, after a link to it.
     fn live(&self, name: &str, target: &str) -> Option<String> {
-        let path = self.root.join(from_root(name, target)?);
+        let link = self.opens(name, &from_root(name, target)?)?;
+        Some(format!(" ([open this case]({link}))"))
+    }
+
+    /// The link that opens the case of the first command of a tutorial's step, with what `--set` changes.
+    fn step(&self, name: &str, block: &str) -> Option<String> {
+        if !name.starts_with(TUTORIALS) {
+            return None;
+        }
+        block.lines().find_map(|line| {
+            let words = words(line.strip_prefix("$ nanotap ")?);
+            let places = |file: &String| [from_root(name, file), Some(format!("{CASES}/{file}"))];
+            let mut paths = words.iter().flat_map(places).flatten();
+            let link = paths.find_map(|path| self.opens(name, &path))?;
+            let pairs = words.windows(2).filter(|pair| pair[0] == "--set");
+            let set: Vec<(&str, &str)> = pairs.filter_map(|pair| pair[1].split_once('=')).collect();
+            Some(format!("[Open this case]({})", with_changes(&link, &set)))
+        })
+    }
+
+    /// The link from the page `name` that opens the case file at a path from the repository's root.
+    fn opens(&self, name: &str, path: &str) -> Option<String> {
+        let path = self.root.join(path);
         path.extension().filter(|ending| *ending == "toml")?;
         let case = fs::read_to_string(path).ok()?;
         // The explorer is one folder above the documents.
         let page = "../".repeat(name.matches('/').count() + 1);
-        Some(format!(" ([open this case]({}))", link(&page, &case)))
+        Some(link(&page, &case))
     }
 
+    /// The pages in the summary, from the repository's root.
     fn listed(&self) -> impl Iterator<Item = String> {
         let links = self.summary.links.iter();
         links.filter_map(|link| from_root("docs/SUMMARY.md", &link.target))
@@ -271,6 +302,16 @@ fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Trouble> {
     fs::create_dir_all(parent)
         .and_then(|()| fs::write(&path, bytes))
         .map_err(|error| wrong(name, error.to_string()))
+}
+
+/// The words of a command, in which quotation marks hold blanks.
+fn words(line: &str) -> Vec<String> {
+    let mut quoted = false;
+    let ends = |c: char| {
+        quoted ^= c == '"';
+        c == ' ' && !quoted
+    };
+    line.split(ends).map(|word| word.replace('"', "")).collect()
 }
 
 fn without_anchor(target: &str) -> &str {

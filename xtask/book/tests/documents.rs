@@ -7,6 +7,7 @@ use std::path::Path;
 
 use nanotap::control::Control;
 use nanotap_book::{Site, outdated_reference};
+use nanotap_explorer::link::link;
 use nanotap_paper::{Options, report};
 
 #[test]
@@ -23,6 +24,44 @@ fn nothing_is_wrong_with_the_documents() {
     let lines: Vec<String> = troubles.iter().map(ToString::to_string).collect();
     assert!(troubles.is_empty(), "{}", lines.join("\n"));
     assert!(site.len() > 30, "only {} pages were found", site.len());
+}
+
+/// Every step of a tutorial opens in the page, with what its command changes.
+#[test]
+fn steps_of_tutorials_open_in_the_page() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let options = Options {
+        only: vec!["eq14".into()],
+        quick: true,
+    };
+    let report = report(&options, &Control::default()).unwrap();
+    let folder = std::env::temp_dir().join(format!("nanotap-steps-{}", std::process::id()));
+    Site::read(&root, &report).unwrap().write(&folder).unwrap();
+    let page = |name: &str| std::fs::read_to_string(folder.join("docs").join(name)).unwrap();
+    let case = |path: &str| {
+        let text = std::fs::read_to_string(root.join("docs").join(path)).unwrap();
+        link("../../../", &text)
+    };
+    for (name, file, changes) in [
+        (
+            "dynamicist",
+            "cases/paper.toml",
+            "&set.alpha3=0.02&set.omega=15.8",
+        ),
+        (
+            "microscopist",
+            "tutorials/polymer.toml",
+            "&set.gap.tip=9.138%20nm",
+        ),
+    ] {
+        let page = page(&format!("tutorials/{name}.md"));
+        let opens = format!("```\n\n[Open this case]({}", case(file));
+        let steps = page.matches("```console").count();
+        assert_eq!(page.matches(&opens).count(), steps, "{name}");
+        assert!(page.contains(&format!("{opens}{changes})")), "{name}");
+    }
+    assert!(!page("cases/noise.md").contains("[Open this case]"));
+    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]

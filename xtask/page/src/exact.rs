@@ -1,8 +1,10 @@
-//! A module that gives the same numbers on every machine.
+//! Modules that give the same numbers on every machine.
 //!
-//! `relaxed_madd` is fused where the processor has such an instruction, and rounds twice elsewhere. Here
-//! each one is replaced by a call of the module's own function, which computes the fused result from exact
-//! products and sums. The code is so compiled once, and both modules agree in everything else.
+//! A relaxed instruction may give one of several results. Those for least and greatest values, lanes and
+//! whole numbers are replaced by the exact ones of which the compiler made them. `relaxed_madd` is fused
+//! where the processor has such an instruction, and rounds twice elsewhere: one module keeps it, and in the
+//! other, which needs no relaxed instruction, each is a call of the module's own function, which computes
+//! the fused result from exact products and sums. The code is so compiled once.
 
 use std::convert::Infallible;
 
@@ -22,19 +24,36 @@ pub(crate) enum ModuleError {
     /// It has no function of this name.
     #[error("the module exports no function `{0}`")]
     Missing(&'static str),
+    /// It has a relaxed instruction for which there is no exact one here.
+    #[error("the module has the relaxed instruction {0}")]
+    Relaxed(String),
     /// It could not be written.
     #[error("the module cannot be written again: {0}")]
     Encoding(#[from] Error<Infallible>),
 }
 
-/// The module with calls in place of relaxed multiply-adds.
-pub(crate) fn rewritten(module: &[u8]) -> Result<Vec<u8>, ModuleError> {
+/// What becomes of relaxed multiply-adds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MultiplyAdd {
+    /// They stay, for machines that fuse them.
+    Kept,
+    /// They are calls of functions.
+    Called,
+}
+
+/// The module without relaxed instructions, but for multiply-adds that are kept.
+pub(crate) fn rewritten(module: &[u8], multiply_add: MultiplyAdd) -> Result<Vec<u8>, ModuleError> {
     let mut replacement = Replacement {
         functions: functions(module)?,
+        multiply_add,
+        other: None,
     };
     let mut out = Module::new();
     utils::parse_core_module(&mut replacement, &mut out, Parser::new(0), module)?;
-    Ok(out.finish())
+    match replacement.other {
+        Some(other) => Err(ModuleError::Relaxed(other)),
+        None => Ok(out.finish()),
+    }
 }
 
 /// The indices of the functions that compute fused results.
@@ -57,6 +76,9 @@ fn functions(module: &[u8]) -> Result<[u32; 2], ModuleError> {
 
 struct Replacement {
     functions: [u32; 2],
+    multiply_add: MultiplyAdd,
+    /// A relaxed instruction for which there is no exact one.
+    other: Option<String>,
 }
 
 impl Reencode for Replacement {
@@ -66,9 +88,32 @@ impl Reencode for Replacement {
         &mut self,
         operator: Operator<'a>,
     ) -> Result<Instruction<'a>, Error<Infallible>> {
+        let called = self.multiply_add == MultiplyAdd::Called;
         Ok(match operator {
-            Operator::F64x2RelaxedMadd => Instruction::Call(self.functions[0]),
-            Operator::F64x2RelaxedNmadd => Instruction::Call(self.functions[1]),
+            Operator::F64x2RelaxedMadd if called => Instruction::Call(self.functions[0]),
+            Operator::F64x2RelaxedNmadd if called => Instruction::Call(self.functions[1]),
+            // The compiler makes them of comparisons and selections.
+            Operator::F64x2RelaxedMin => Instruction::F64x2PMin,
+            Operator::F64x2RelaxedMax => Instruction::F64x2PMax,
+            Operator::F32x4RelaxedMin => Instruction::F32x4PMin,
+            Operator::F32x4RelaxedMax => Instruction::F32x4PMax,
+            Operator::I8x16RelaxedLaneselect
+            | Operator::I16x8RelaxedLaneselect
+            | Operator::I32x4RelaxedLaneselect
+            | Operator::I64x2RelaxedLaneselect => Instruction::V128Bitselect,
+            Operator::I8x16RelaxedSwizzle => Instruction::I8x16Swizzle,
+            Operator::I32x4RelaxedTruncF32x4S => Instruction::I32x4TruncSatF32x4S,
+            Operator::I32x4RelaxedTruncF32x4U => Instruction::I32x4TruncSatF32x4U,
+            Operator::I32x4RelaxedTruncF64x2SZero => Instruction::I32x4TruncSatF64x2SZero,
+            Operator::I32x4RelaxedTruncF64x2UZero => Instruction::I32x4TruncSatF64x2UZero,
+            other @ (Operator::F32x4RelaxedMadd
+            | Operator::F32x4RelaxedNmadd
+            | Operator::I16x8RelaxedQ15mulrS
+            | Operator::I16x8RelaxedDotI8x16I7x16S
+            | Operator::I32x4RelaxedDotI8x16I7x16AddS) => {
+                self.other = Some(format!("{other:?}"));
+                utils::instruction(self, other)?
+            }
             other => utils::instruction(self, other)?,
         })
     }
@@ -117,18 +162,41 @@ mod tests {
             (Instruction::F64x2RelaxedMadd, 1),
             (Instruction::F64x2RelaxedNmadd, 2),
         ] {
+            let own = module(&operation);
             let expected = module(&Instruction::Call(called));
-            assert_eq!(rewritten(&module(&operation)).unwrap(), expected);
+            assert_eq!(rewritten(&own, MultiplyAdd::Called).unwrap(), expected);
+            assert_eq!(rewritten(&own, MultiplyAdd::Kept).unwrap(), own);
+        }
+    }
+
+    #[test]
+    fn no_other_relaxed_operation_is_left() {
+        for how in [MultiplyAdd::Kept, MultiplyAdd::Called] {
+            for (relaxed, exact) in [
+                (Instruction::F64x2RelaxedMax, Instruction::F64x2PMax),
+                (Instruction::F64x2RelaxedMin, Instruction::F64x2PMin),
+                (
+                    Instruction::I64x2RelaxedLaneselect,
+                    Instruction::V128Bitselect,
+                ),
+            ] {
+                let written = rewritten(&module(&relaxed), how).unwrap();
+                assert_eq!(written, module(&exact));
+            }
+            let refused = rewritten(&module(&Instruction::F32x4RelaxedMadd), how);
+            assert!(matches!(refused, Err(ModuleError::Relaxed(_))));
         }
     }
 
     #[test]
     fn a_module_without_the_functions_is_refused() {
         let empty = Module::new().finish();
-        let refused = rewritten(&empty).unwrap_err().to_string();
+        let refused = rewritten(&empty, MultiplyAdd::Called)
+            .unwrap_err()
+            .to_string();
         assert_eq!(refused, "the module exports no function `nanotap_fused`");
         assert!(matches!(
-            rewritten(b"no module"),
+            rewritten(b"no module", MultiplyAdd::Called),
             Err(ModuleError::Invalid(_))
         ));
     }

@@ -19,10 +19,20 @@ use std::process::ExitCode;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use nanotap::control::Control;
+use nanotap_explorer::Explorer;
+use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
+
+use crate::exact::MultiplyAdd;
 
 /// The version of the page in its service worker, until the page is written.
 const VERSION: &str = "\"development\"";
+/// Its list of files until then.
+const FILES: &str = "[\"./\"]";
+const WORKER: &str = "service-worker.js";
+/// The first example of the page and what it holds, as in main.js.
+const FIRST: (&str, &str, &str) = ("dmt", "drive.setpoint", "0.8");
 
 /// Why the page was not written.
 #[derive(Debug, thiserror::Error)]
@@ -57,8 +67,10 @@ fn main() -> ExitCode {
 
 fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageError> {
     let source = repository.join("crates/nanotap-explorer/page");
-    let fused = read(module)?;
-    let exact = exact::rewritten(&fused)?;
+    let compiled = read(module)?;
+    let [fused, exact] = [MultiplyAdd::Kept, MultiplyAdd::Called]
+        .map(|multiply_add| exact::rewritten(&compiled, multiply_add));
+    let (fused, exact) = (fused?, exact?);
     let mut texts = BTreeMap::new();
     let listing = fs::read_dir(&source).map_err(of(&source))?;
     for path in listing.flatten().map(|entry| entry.path()) {
@@ -66,6 +78,9 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
         let text = fs::read_to_string(&path).map_err(of(&path))?;
         texts.insert(name.into_owned(), text);
     }
+    let index = texts.entry(single::INDEX.into()).or_default();
+    let closed = format!("{}{}", first_states(), single::END);
+    *index = replaced(single::INDEX, index, single::END, &closed)?;
     let whole = single::page(&texts, &fused, &exact)?;
     // Another version of any file is another version of the page, which browsers then load anew.
     let mut hash = Sha256::new();
@@ -74,8 +89,12 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     }
     hash.update(&fused);
     let version = format!("\"{}\"", STANDARD.encode(hash.finalize()));
-    let worker = texts.entry("service-worker.js".into()).or_default();
-    *worker = replaced("service-worker.js", worker, VERSION, &version)?;
+    let names = texts.keys().map(String::as_str);
+    let names = names.filter(|name| ![single::INDEX, WORKER].contains(name));
+    let files = json!(["./"].into_iter().chain(names).collect::<Vec<_>>()).to_string();
+    let worker = texts.entry(WORKER.into()).or_default();
+    *worker = replaced(WORKER, worker, VERSION, &version)?;
+    *worker = replaced(WORKER, worker, FILES, &files)?;
     fs::create_dir_all(folder).map_err(of(folder))?;
     let modules = [("nanotap.wasm", &fused), ("nanotap-exact.wasm", &exact)];
     let texts = texts
@@ -93,6 +112,21 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
         println!("{:>9} bytes  {}", bytes.len(), path.display());
     }
     Ok(())
+}
+
+/// What the page shows before its module is there: the states of its first example, with the case that they
+/// are of as `caseText` in state.js writes it.
+fn first_states() -> String {
+    let (preset, key, value) = FIRST;
+    let case = json!({ "preset": preset, "set": [format!("{key}={value}")] });
+    let answer = Explorer::new(None).ok().and_then(|explorer| {
+        let request = json!({ "case": case }).to_string();
+        let control = Control::default();
+        let answer = explorer.answer("/api/states", request.as_bytes(), &control, &|_| {});
+        serde_json::from_slice::<Value>(&answer.bytes).ok()
+    });
+    let first = json!({ "of": json!([preset, [[key, value]]]).to_string(), "answer": answer });
+    format!("<script type=\"application/json\" id=\"first\">{first}</script>\n")
 }
 
 /// The text of a file with the first occurrence of a part replaced.

@@ -10,7 +10,7 @@ use sha2::{Digest as _, Sha256};
 use crate::{PageError, bundle, replaced};
 
 /// The page.
-const INDEX: &str = "index.html";
+pub(crate) const INDEX: &str = "index.html";
 /// Level of the compression of modules.
 const LEVEL: u8 = 10;
 /// What the page loads that is in the one file.
@@ -20,7 +20,7 @@ const ICON: &str = "href=\"./icon.svg\"";
 /// What begins and ends the page's policy.
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"";
 const CLOSED: &str = "\">";
-const END: &str = "</body>";
+pub(crate) const END: &str = "</body>";
 
 /// The page, with both modules.
 pub(crate) fn page(

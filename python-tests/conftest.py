@@ -1,10 +1,13 @@
 """Fixtures of all tests. Run by `cargo xtask test-python` on the installed wheel."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import nanotap
 import numpy as np
 import pytest
+from browsers import CHROMIUM, FLAGS, address_of, limited, started
 
 
 @pytest.fixture(scope="session")
@@ -65,3 +68,46 @@ def cell_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray
             group["height (measured)"].attrs["unit"] = "m"
             group["segment"] = np.repeat([0, 1], 400)
     return path, moduli
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """The address of a local server."""
+    with started() as server:
+        yield address_of(server)
+
+
+@pytest.fixture(scope="module")
+def playwright() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        yield playwright
+
+
+@pytest.fixture(scope="module")
+def browser(playwright: Any) -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine: Debian's package is called chromium")
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    yield browser
+    with limited(20):
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def page(address: str, browser: Any) -> Any:
+    page = browser.new_page(viewport={"width": 1440, "height": 1000})
+    page.set_default_timeout(30_000)
+    page.complaints = []
+    page.asked = []
+    page.on(
+        "console",
+        lambda m: page.complaints.append(m.text) if m.type == "error" else None,
+    )
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.on("request", lambda request: page.asked.append(request.url))
+    with limited():
+        # The first page of a browser takes long on a busy machine.
+        page.goto(f"{address}#view=studies", timeout=60_000)
+        page.wait_for_selector("td[data-observable=amplitude]")
+    return page

@@ -76,6 +76,9 @@ def test_a_solved_setpoint_is_part_of_the_case():
     assert (
         case.mapping.si["alpha5"] == distance == case.to_dict()["physical"]["tip_gap"]
     )
+    assert case.tables["mapping"].set_index("parameter").si["alpha5"] == distance
+    assert case.tables["solutions"]["gap.tip"][0] == distance
+    assert list(nanotap.Case(**GIVEN).tables) == ["numbers"]
     assert case.alpha5 == pytest.approx(distance / case.physical.beam_gap, rel=1e-14)
     saved = nanotap.Case.from_toml(case.to_toml())
     assert saved.physical.tip_gap == distance
@@ -120,6 +123,7 @@ def test_a_physical_case_maps_both_ways(physical):
     assert physical.physical.free_amplitude == pytest.approx(20e-9, rel=1e-9)
     assert physical.alpha4 == pytest.approx(25.65, abs=0.01)
     assert any(kind == "note" for kind, _ in physical.remarks)
+    assert list(mapping.columns) == ["value", "formula", "quantity", "si", "unit"]
     assert nanotap.Case(**GIVEN).mapping.empty
     assert "polystyrene" in set(nanotap.catalogue().name)
 

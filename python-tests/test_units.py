@@ -45,6 +45,7 @@ ELSEWHERE = {
     "calibrate",
     "fit",
     "fit_map",
+    "image_states",
     "reconstruct",
     "scan",
     "paper",

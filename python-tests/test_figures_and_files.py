@@ -198,7 +198,7 @@ def test_the_terminals_own_picture_is_to_be_had(regular, tmp_path):
     )
     assert b"<svg" in nanotap._nanotap.figure(out, "svg")
     assert nanotap._nanotap.figure(out, "png").startswith(b"\x89PNG")
-    with pytest.raises(ValueError, match="expected svg, png or pdf"):
+    with pytest.raises(ValueError, match="expected svg, png, pdf or json"):
         nanotap._nanotap.figure(out, "gif")
 
 

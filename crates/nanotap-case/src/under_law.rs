@@ -177,9 +177,9 @@ impl Case {
     /// Returns true if the contact law or the drive of the case does not have the key.
     pub fn is_foreign(&self, key: Key) -> bool {
         if let (CaseKind::Cantilever(cantilever), Some(parameter)) = (&self.what, key.parameter()) {
-            // A measured number of a mode can always be stated.
-            let measured = parameter.entry().applies == Applies::Measured;
-            return !measured && !cantilever.has(parameter);
+            // Numbers of measured modes and of Q control can always be stated.
+            let free = parameter.entry().applies == Applies::NotZero;
+            return !free && !cantilever.has(parameter);
         }
         let CaseKind::Quantities(quantities) = &self.what else {
             return false;

@@ -176,7 +176,7 @@ impl Cantilever {
             Applies::Damper => self.law.is_none() && self.contact.has_damper(),
             Applies::Law(law) => self.law.is_none() && self.contact == law,
             Applies::Tone(number) => self.further_tones.len() + 2 > number,
-            Applies::Measured => self.get(parameter) != 0.0,
+            Applies::NotZero => self.get(parameter) != 0.0,
         }
     }
 
@@ -195,6 +195,16 @@ impl Cantilever {
     /// lever as a whole.
     pub fn has_measured_modes(&self) -> bool {
         !self.lever_modes.is_empty() || Parameter::MEASURED.iter().any(|of| self.has(*of))
+    }
+
+    /// Returns true if the deflection is fed back to a force at the tip.
+    pub fn has_q_control(&self) -> bool {
+        self.has(Parameter::QControlGain)
+    }
+
+    /// Returns true if the lever is not the uniform beam with a mass at its tip.
+    pub fn is_corrected(&self) -> bool {
+        self.has_measured_modes() || self.has_q_control()
     }
 
     /// Returns the values of the parameters that only the contact law has.
@@ -555,6 +565,8 @@ pub enum Reason {
     SameTone,
     /// Tones that repeat together after too many periods.
     Repetition,
+    /// A feedback under which the free lever oscillates by itself.
+    SelfExcited,
 }
 
 impl fmt::Display for Reason {
@@ -620,6 +632,9 @@ impl fmt::Display for Reason {
             Self::Tones => write!(
                 formatter,
                 "expected at most {MAX_TONES} tones, and ratios of whole numbers for all of three"
+            ),
+            Self::SelfExcited => formatter.write_str(
+                "the free lever would oscillate by itself: take a smaller gain, or a phase nearer -90 degrees",
             ),
             Self::SameTone => formatter
                 .write_str("two tones have the same frequency: add their amplitudes to one tone"),

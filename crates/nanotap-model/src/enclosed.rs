@@ -30,6 +30,9 @@ pub enum EnclosureError {
     /// The lever has measured higher modes, but proofs are of uniform beams.
     #[error("proofs are of uniform beams, and this one has measured higher modes")]
     MeasuredModes,
+    /// The deflection is fed back to the lever, but proofs are of uniform beams.
+    #[error("proofs are of uniform beams without feedback, and this one has Q control")]
+    QControl,
     /// A force that jumps where contact begins.
     #[error(
         "proofs are of contact forces that begin at zero or with a damper, and that of a \
@@ -92,6 +95,9 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     }
     if case.has_measured_modes() {
         return Err(EnclosureError::MeasuredModes);
+    }
+    if case.has_q_control() {
+        return Err(EnclosureError::QControl);
     }
     if case.has_attractive_surface() {
         return Err(EnclosureError::ForceJumps { law: case.contact });

@@ -10,13 +10,18 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::beam::Modes;
-use crate::cantilever::{Cantilever, CantileverError, CosineTerm};
+use crate::cantilever::{Cantilever, CantileverError, CosineTerm, Reason};
 use crate::contact::dual::Dual;
 use crate::drive_form::{Actuation, FrequencyRatio};
 use crate::measured_modes::Correction;
 use crate::parameter::Parameter;
+use crate::spectrum::dense_eigenvalues;
 use nanotap_arithmetic::Scalar as _;
 use nanotap_flow::Complex;
+
+/// Rounding error of an eigenvalue, as a part of the square of the largest: the stiffness has entries of
+/// this size.
+const ROUNDING: f64 = 1e-14;
 
 /// The two linear regimes of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,7 +90,7 @@ pub struct Galerkin {
     pub forcing: [Forcing; 2],
     /// Height V_T of the tip over the undeformed surface, in units of g₀: Eq. (8).
     pub gap: Gap,
-    /// Corrections by measured modes, which the matrices already contain.
+    /// Corrections by measured modes and Q control, which the matrices already contain.
     pub(crate) corrections: Vec<Correction>,
 }
 
@@ -123,7 +128,7 @@ impl Galerkin {
             forcing,
             gap,
         } = equations;
-        Ok(Self {
+        let equations = Self {
             case: case.clone(),
             modes,
             mass,
@@ -132,7 +137,24 @@ impl Galerkin {
             forcing,
             gap,
             corrections,
-        })
+        };
+        if case.has_q_control() && equations.grows() {
+            return Err(CantileverError {
+                key: Parameter::QControlGain.name(),
+                value: case.get(Parameter::QControlGain),
+                reason: Reason::SelfExcited,
+            });
+        }
+        Ok(equations)
+    }
+
+    /// Returns true if a motion of the free lever grows without a drive.
+    fn grows(&self) -> bool {
+        let values = dense_eigenvalues(self, Regime::Free);
+        let error = values
+            .last()
+            .map_or(0.0, |largest| ROUNDING * largest.norm_sqr());
+        values.iter().any(|value| value.re > error)
     }
 
     /// The exact derivative with respect to `parameter`.
@@ -145,7 +167,7 @@ impl Galerkin {
 }
 
 impl GalerkinDerivative {
-    /// Adds the corrections by measured modes, or their derivatives by `parameter`: to the
+    /// Adds the corrections by measured modes and Q control, or their derivatives by `parameter`: to the
     /// matrices, and where the base moves by y, the force −(mass ÿ + damping ẏ) along each mode.
     fn correct(
         &mut self,

@@ -1,4 +1,4 @@
-//! Measured modes in the Galerkin equations, in place of those of the uniform beam.
+//! Measured modes in the Galerkin equations, in place of those of the uniform beam, and Q control.
 //!
 //! Damping proportional to mass gives the higher modes a quality factor in proportion to their
 //! frequency, several times that of real levers in air; and no lever is uniform. With the free
@@ -19,6 +19,10 @@
 //!
 //! The modes of a lever that was measured as a whole (see [`lever_mode`](crate::lever_mode)) are
 //! already those of the equations; only the damping of each is corrected here.
+//!
+//! Q control feeds the deflection `w = p·X` of the tip back to a force at the tip, through a gain `G` and
+//! a phase `θ` at the first free resonance `Ω₁`: `G (w cos θ + ẇ sin θ/Ω₁)`. That is a term of rank one in
+//! each matrix, too: `C − (G sin θ/Ω₁) ppᵀ` and `K − (G cos θ) ppᵀ`.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -29,14 +33,14 @@ use crate::lever_mode::LeverMode;
 use crate::parameter::Parameter;
 use nanotap_arithmetic::Scalar as _;
 
-/// Correction by a measured mode: a term of rank one in each matrix, with its derivatives.
+/// Correction by a measured mode or by Q control: a term of rank one in each matrix, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Correction {
-    /// u = Mv of the free mode v, length N.
+    /// u = Mv of the free mode v, or p of Q control, length N.
     pub(crate) row: DVector<f64>,
     /// Derivative of u by the parameter, length N.
     pub(crate) row_change: DVector<f64>,
-    /// (α₁p + I)·v, by which the mode moves with the base.
+    /// (α₁p + I)·v, by which the mode moves with the base; 0 of Q control.
     pub(crate) base: Dual,
     /// Factor s − 1 of uuᵀ in M, dimensionless.
     pub(crate) mass: Dual,
@@ -49,10 +53,24 @@ pub(crate) struct Correction {
 impl Correction {
     /// Computes the corrections of a case, with derivatives by `parameter`.
     pub(crate) fn all(case: &Cantilever, beam: &Modes, parameter: Option<Parameter>) -> Vec<Self> {
-        if !case.has_measured_modes() {
+        if !case.is_corrected() {
             return Vec::new();
         }
         let dual = |number| case.dual(number, parameter);
+        let free = FreeModes::of(case, beam);
+        let mut all = Self::of_measured_modes(case, beam, &free, &dual);
+        if case.has_q_control() {
+            all.push(Self::of_q_control(beam, &free, &dual));
+        }
+        all
+    }
+
+    fn of_measured_modes(
+        case: &Cantilever,
+        beam: &Modes,
+        free: &FreeModes,
+        dual: &impl Fn(Parameter) -> Dual,
+    ) -> Vec<Self> {
         if !case.lever_modes.is_empty() {
             let modes = case.lever_modes.iter().take(case.modes).enumerate();
             let damped = modes.filter(|(_, mode)| mode.quality > 0.0);
@@ -61,14 +79,13 @@ impl Correction {
             };
             return damped.map(correction).collect();
         }
-        let free = FreeModes::of(case, beam);
         let measured = |p| Some(dual(p)).filter(|number| number.value != 0.0);
         let of_mode = |k: usize, [frequency, quality]: [Parameter; 2], stiffness: Option<Dual>| {
             let frequency = measured(frequency);
             let quality = measured(quality);
             let any = frequency.is_some() || quality.is_some() || stiffness.is_some();
             (any && k < free.squares.len())
-                .then(|| free.correction(case, beam, k, &dual, [frequency, quality, stiffness]))
+                .then(|| free.correction(case, beam, k, dual, [frequency, quality, stiffness]))
         };
         [
             of_mode(
@@ -98,6 +115,22 @@ impl Correction {
             mass: Dual::constant(0.0),
             damping: Dual::constant(mode.frequency / mode.quality) - alpha3,
             stiffness: Dual::constant(0.0),
+        }
+    }
+
+    /// Gain and phase of Q control; see the module.
+    fn of_q_control(beam: &Modes, free: &FreeModes, dual: &impl Fn(Parameter) -> Dual) -> Self {
+        let [gain, phase] = Parameter::Q_CONTROL.map(dual);
+        let (sine, cosine) = phase.to_radians().sin_cos();
+        let none = Dual::constant(0.0);
+        let resonance = free.square(0, &beam.tip, dual(Parameter::Alpha1)).sqrt();
+        Self {
+            row: beam.tip.clone(),
+            row_change: DVector::zeros(beam.count()),
+            base: none,
+            mass: none,
+            damping: none - gain * sine / resonance,
+            stiffness: none - gain * cosine,
         }
     }
 
@@ -151,6 +184,13 @@ impl FreeModes {
         }
     }
 
+    /// Squared natural frequency of mode `k`, of which only the tip's mass is varied.
+    fn square(&self, k: usize, tip: &DVector<f64>, mass: Dual) -> Dual {
+        let square = self.squares[k];
+        let at_tip = self.shapes.column(k).dot(tip);
+        Dual::new(square, -square * at_tip.powi(2) * mass.derivative())
+    }
+
     fn correction(
         &self,
         case: &Cantilever,
@@ -173,7 +213,7 @@ impl FreeModes {
         let loaded = |x: &DVector<f64>| x + p * (case.alpha1 * p.dot(x));
         let carried = p * case.alpha1 + &beam.integral;
         let deflection = Dual::new(at_tip(k), change.dot(p));
-        let own = Dual::new(square, -square * at_tip(k).powi(2) * ratio.derivative());
+        let own = self.square(k, p, ratio);
         let squared = frequency.map_or(own, |f| f * f);
         let mass = stiffness.map_or(Dual::constant(1.0), |stiffness| {
             stiffness * deflection * deflection / squared

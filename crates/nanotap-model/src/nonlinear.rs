@@ -653,7 +653,9 @@ impl Variation {
         law: &[f64],
     ) -> Result<Self, ModelError> {
         let of_modes = |p: Parameter| {
-            matches!(p, Parameter::Alpha1 | Parameter::Alpha3) || Parameter::MEASURED.contains(&p)
+            matches!(p, Parameter::Alpha1 | Parameter::Alpha3)
+                || Parameter::MEASURED.contains(&p)
+                || Parameter::Q_CONTROL.contains(&p)
         };
         if slopes
             .iter()

@@ -69,8 +69,8 @@ pub enum Applies {
     Law(ContactLaw),
     /// Where the drive has this further tone, 2 or 3.
     Tone(usize),
-    /// Where it is not 0: a measured number of a mode.
-    Measured,
+    /// Where it is not 0: a measured number of a mode, or one of Q control.
+    NotZero,
 }
 
 /// Kind of physical quantity behind a parameter, with the SI unit of its values and the model's
@@ -217,9 +217,7 @@ const fn measured(
     symbol: &'static str,
     meaning: &'static str,
 ) -> ParameterEntry {
-    number(name, symbol, meaning)
-        .or(0.0)
-        .when(Applies::Measured)
+    number(name, symbol, meaning).or(0.0).when(Applies::NotZero)
 }
 
 macro_rules! parameters {
@@ -290,6 +288,12 @@ parameters! {
             .of(Unit::Stiffness, "stiffness of the second mode", "k2 L^3/(EI) = 3 k2/k");
         Mode3Stiffness = measured("mode3_stiffness", "k₃", "measured stiffness of the third free mode at the tip, k3·L³/(EI) (0: the beam's own)")
             .of(Unit::Stiffness, "stiffness of the third mode", "k3 L^3/(EI) = 3 k3/k");
+        QControlGain = number("q_control_gain", "G", "Q control: force at the tip per deflection of the tip, G·L³/(EI)")
+            .or(0.0).when(Applies::NotZero)
+            .of(Unit::Stiffness, "gain of Q control", "G L^3/(EI) = 3 G/k");
+        QControlPhase = number("q_control_phase", "θ", "phase by which the force of Q control leads the deflection at the first resonance, in degrees: 90 raises Q, -90 lowers it")
+            .or(0.0).when(Applies::NotZero).within(SIGNED).such_as(-90.0)
+            .of(Unit::Degrees, "phase of Q control", "degrees");
     }
 }
 
@@ -322,6 +326,8 @@ impl Parameter {
         Self::Mode2Stiffness,
         Self::Mode3Stiffness,
     ];
+    /// Gain and phase of the feedback of the deflection.
+    pub const Q_CONTROL: [Self; 2] = [Self::QControlGain, Self::QControlPhase];
     /// Amplitude and phase of each further tone.
     pub const TONES: [[Self; 2]; MAX_TONES - 1] = [
         [Self::Tone2Amplitude, Self::Tone2Phase],

@@ -87,8 +87,8 @@ impl ModeTable {
                 Ok(Vec::new())
             }
         };
-        // Measured modes fill the matrices.
-        let dense = if case.has_measured_modes() {
+        // Measured modes and Q control fill the matrices.
+        let dense = if case.is_corrected() {
             Some(Galerkin::new(case)?)
         } else {
             None

@@ -239,6 +239,14 @@ const FLANK: Range = Range {
     ..Range::ANY
 };
 
+const HALF_TURN: Range = Range {
+    low: -std::f64::consts::PI,
+    high: std::f64::consts::PI,
+    above: false,
+    below: false,
+    reason: "it must lie between -180 and 180 deg; a number without a unit is in radians",
+};
+
 const RELATIVE_ERROR: Range = Range {
     low: 0.0,
     high: 1.0,
@@ -553,6 +561,12 @@ After from AFTER_LAWS => {
         Drive, "hold", Takes::Word(words!(Hold)),
         "what stays while another key varies: the drive's own amplitude or force (default), or the free amplitude",
     );
+    DriveQControlGain = quantity(Drive, "q_control_gain", Kind::Stiffness, R::NOT_NEGATIVE, "Q control: force at the tip per deflection of the tip, whose phase q_control_phase tells")
+        .feeds(Parameter::QControlGain)
+        .label("gain of Q control");
+    DriveQControlPhase = quantity(Drive, "q_control_phase", Kind::Angle, HALF_TURN, "phase by which the force of Q control leads the deflection at the first resonance: 90° raises Q, -90° lowers it")
+        .feeds(Parameter::QControlPhase)
+        .label("phase of Q control");
     SecondFrequency = quantity(Drive, "second_frequency", Kind::Frequency, R::POSITIVE, "frequency of a second tone");
     SecondRatio = other(Drive, "second_ratio", Takes::FrequencyRatio, "frequency of a second tone over that of the first");
     SecondAmplitude = quantity(Drive, "second_amplitude", Kind::Length, R::NOT_NEGATIVE, "amplitude of the second tone's motion of the clamped end")

@@ -23,6 +23,8 @@ pub struct Drive {
     pub(crate) setpoint: Option<(Kind, f64)>,
     /// Where the drive acts: on the base, on the tip or along the lever.
     pub actuation: Actuation,
+    /// Gain, N/m, and phase, rad, of Q control; 0 without it.
+    pub(crate) q_control: [f64; 2],
     /// The second tone, if there is one, and the third.
     pub(crate) further: [Option<FurtherTone>; MAX_TONES - 1],
 }
@@ -135,6 +137,7 @@ impl Drive {
                 _ => (Kind::Number, value),
             }),
             actuation,
+            q_control: read_q_control(reader)?,
             further: read_further(reader, actuation)?,
         })
     }
@@ -172,6 +175,22 @@ fn read_strength(
         return Err(reader.impossible(other, why));
     }
     reader.first(&[key, free])
+}
+
+fn read_q_control(reader: Reader<'_>) -> Result<[f64; 2], PhysicalError> {
+    let [gain, phase] = [Key::DriveQControlGain, Key::DriveQControlPhase];
+    match [reader.number(gain)?, reader.number(phase)?] {
+        [None, None] => Ok([0.0; 2]),
+        [Some(gain), Some(phase)] => Ok([gain, phase]),
+        [None, _] => Err(PhysicalError::missing(
+            gain,
+            "Q control has a gain and a phase: give it, such as \"0.01 N/m\"",
+        )),
+        [_, None] => Err(PhysicalError::missing(
+            phase,
+            "Q control has a gain and a phase: \"90 deg\" raises Q, \"-90 deg\" lowers it",
+        )),
+    }
 }
 
 fn read_further(

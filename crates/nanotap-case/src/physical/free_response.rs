@@ -40,8 +40,8 @@ pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, Ca
         value: error.given as f64,
         reason: Reason::Modes,
     })?;
-    if case.has_measured_modes() {
-        return response_with_measured_modes(case, frequency);
+    if case.is_corrected() {
+        return response_of_matrices(case, frequency);
     }
     let square = frequency * frequency;
     let mut tip = Complex::new(0.0, 0.0);
@@ -64,8 +64,8 @@ pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, Ca
     Ok(driven / (1.0 - inertia * tip))
 }
 
-/// The same where modes were measured, whose terms fill the matrices: one linear system.
-fn response_with_measured_modes(
+/// The same where measured modes or Q control fill the matrices: one linear system.
+fn response_of_matrices(
     case: &Cantilever,
     frequency: f64,
 ) -> Result<Complex<f64>, CantileverError> {

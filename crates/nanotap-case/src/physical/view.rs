@@ -207,6 +207,12 @@ impl Physical {
                 quantity(Parameter::Alpha2)
             }
             Key::DriveFreeAmplitude => self.free_amplitude,
+            Key::DriveQControlGain if self.cantilever.has_q_control() => {
+                quantity(Parameter::QControlGain)
+            }
+            Key::DriveQControlPhase if self.cantilever.has_q_control() => {
+                quantity(Parameter::QControlPhase)
+            }
             Key::GapTip => quantity(Parameter::Alpha5),
             Key::GapBeam => self.scales.length,
             _ => return None,
@@ -304,11 +310,16 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     };
     let time = lever.time_unit();
     let mut free = free_case(&lever, frequency, &like);
-    for parameter in Parameter::MEASURED {
+    let measured = Parameter::Q_CONTROL
+        .into_iter()
+        .zip(drive.q_control)
+        .fold(measured, |all, (of, value)| all.with(of, value));
+    for parameter in Parameter::MEASURED.into_iter().chain(Parameter::Q_CONTROL) {
         let value = measured.get(parameter);
         let number = match parameter.entry().unit {
             Unit::Frequency => TAU * value * time,
             Unit::Stiffness => 3.0 * value / lever.k,
+            Unit::Degrees => value.to_degrees(),
             _ => value,
         };
         free = free.with(parameter, number);

@@ -311,7 +311,23 @@ fn lever_rows(given: &mut Table, view: &Physical) {
         &number::significant(lever.quality_factor, 4),
         "quality factor of the first mode",
     ]);
-    if let Some(quality) = ModeTable::new(case).ok().and_then(|table| table.quality) {
+    let table = ModeTable::new(case).ok();
+    let first = table.as_ref().and_then(|table| {
+        let [real, imaginary] = *table.free_eigenvalues.as_ref()?.first()?;
+        Some((real.hypot(imaginary), *table.quality.as_ref()?.first()?))
+    });
+    if let (true, Some((resonance, quality))) = (case.has_q_control(), first) {
+        let frequency = Kind::Frequency.format(resonance * view.scales.frequency);
+        given.row([
+            "closed loop",
+            &frequency,
+            &format!(
+                "first resonance under Q control, Q = {}",
+                number::significant(quality, 4)
+            ),
+        ]);
+    }
+    if let Some(quality) = table.and_then(|table| table.quality) {
         let measured = [Parameter::Mode2Quality, Parameter::Mode3Quality].map(|of| case.get(of));
         for (k, quality) in quality.iter().enumerate().skip(1).take(2) {
             let source = if measured[k - 1] > 0.0 && view.is_in_fluid() {

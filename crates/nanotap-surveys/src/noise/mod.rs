@@ -245,6 +245,12 @@ impl Study for NoiseStudy {
                 "leave out the second tone of the drive",
             ));
         }
+        if lever.has_q_control() {
+            return Err(Error::input(
+                "the noise under Q control is not known here: the feedback adds that of the detector",
+                "leave out drive.q_control_gain, and state the Q that the loop gives the lever",
+            ));
+        }
         if !(options.temperature >= 0.0 && options.temperature.is_finite()) {
             return Err(Error::option(
                 "temperature",

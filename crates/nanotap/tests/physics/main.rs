@@ -21,6 +21,7 @@ mod moving_surface;
 mod observables;
 mod one_shot;
 mod orbit_derivatives;
+mod q_control;
 mod references;
 mod short_contacts;
 mod standard_linear_solid;

@@ -181,6 +181,7 @@ fn every_document_has_a_test() {
             "orbits.md",
             "period-doubling.md",
             "polymer.md",
+            "q-control.md",
             "qi-map.md",
             "reconstruct.md",
             "samples.md",
@@ -272,6 +273,7 @@ follows! {
     the_thermal_noise: "noise.md", 3 commands, 13 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
     the_signals_of_one_shot: "one-shot.md", 2 commands, 9 numbers;
+    q_control: "q-control.md", 3 commands, 7 numbers;
     the_scan: "scan.md", 3 commands, 25 numbers;
     the_formulas: "formula.md", 12 commands, 22 numbers;
     the_states_of_an_image: "image-states.md", 2 commands, 12 numbers;

@@ -134,7 +134,8 @@ fn drawn(app: &Explorer, request: &ForceRequest, case: &Case) -> Result<Value, M
     formula.check(&dimensions, Kind::Force.dimension())?;
     let contact = contact(request, case);
     let values: Vec<f64> = values.iter().map(|value| value.value).collect();
-    let pieces = formula.pieces(&values, contact)?;
+    let moves = formula.moves_surface(&dimensions)?;
+    let pieces = formula.pieces(&values, contact, moves)?;
     let dynamic = formula.depends_on_rate() || formula.remembers();
     let speed = dynamic.then(|| speed(case));
     let [levels, points] = curve(&pieces, contact, speed);

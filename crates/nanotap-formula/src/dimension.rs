@@ -4,6 +4,8 @@ use nanotap_quantity::Dimension;
 
 use crate::error::FormulaError;
 use crate::node::{Id, Node, Nodes, Operator};
+use crate::parser::Memory;
+use crate::program::needed;
 
 /// Difference of two exponents below which they are equal: roots and powers are rounded.
 const EQUAL: f64 = 1e-9;
@@ -43,15 +45,75 @@ fn words(exponents: [f64; 4]) -> String {
     units.join(" ")
 }
 
+const LENGTH: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
+const SPEED: [f64; 4] = [0.0, 1.0, -1.0, 0.0];
+const FORCE: [f64; 4] = [1.0, 1.0, -2.0, 0.0];
+const FREQUENCY: [f64; 4] = [0.0, 0.0, -1.0, 0.0];
+
 /// Checks that every part has a dimension, and the whole the wanted one.
 pub(crate) fn check(
-    nodes: &Nodes,
-    root: Id,
+    (nodes, root): (&Nodes, Id),
+    memory: Option<&Memory>,
     text: &str,
     parameters: &[Dimension],
     wanted: Dimension,
 ) -> Result<(), FormulaError> {
-    let mut known: Vec<Exponents> = Vec::with_capacity(nodes.len());
+    let second = memory.map_or(Ok(SPEED), |memory| of_memory(memory, text, parameters))?;
+    let all: Vec<Id> = (0..nodes.len()).collect();
+    let known = dimensions(nodes, &all, text, parameters, [LENGTH, second])?;
+    let wanted = exponents(wanted);
+    match known[root] {
+        Some(found) if !same(found, wanted) => Err(FormulaError::new(
+            text,
+            nodes.place(root),
+            format!("it is {}, where {} is needed", words(found), words(wanted)),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Reports whether a memory is a length.
+pub(crate) fn is_length(
+    memory: &Memory,
+    text: &str,
+    parameters: &[Dimension],
+) -> Result<bool, FormulaError> {
+    Ok(same(of_memory(memory, text, parameters)?, LENGTH))
+}
+
+/// The dimension of a memory `s' = gain F − decay s`.
+fn of_memory(
+    memory: &Memory,
+    text: &str,
+    parameters: &[Dimension],
+) -> Result<[f64; 4], FormulaError> {
+    let nodes = &memory.nodes;
+    let known = |id: Id| {
+        let all = dimensions(nodes, &needed(nodes, id), text, parameters, [FORCE, SPEED])?;
+        Ok(all[id].unwrap_or_default())
+    };
+    let decay = known(memory.decay)?;
+    if !same(decay, FREQUENCY) {
+        let reason = format!(
+            "the factor of {} is {}, where one over a time is needed",
+            memory.name,
+            words(decay)
+        );
+        return Err(FormulaError::new(text, nodes.place(memory.decay), reason));
+    }
+    let gain = known(memory.gain)?;
+    Ok(std::array::from_fn(|k| gain[k] + FORCE[k] - FREQUENCY[k]))
+}
+
+/// The dimensions of these nodes, each of which stands after its parts, by node.
+fn dimensions(
+    nodes: &Nodes,
+    ids: &[Id],
+    text: &str,
+    parameters: &[Dimension],
+    [gap, rate]: [[f64; 4]; 2],
+) -> Result<Vec<Exponents>, FormulaError> {
+    let mut known: Vec<Exponents> = vec![None; nodes.len()];
     let part = |id: Id| text.get(nodes.place(id)).unwrap_or_default();
     let refused = |id: Id, reason: String| FormulaError::new(text, nodes.place(id), reason);
     // Both of one dimension; zero takes that of the other.
@@ -69,14 +131,14 @@ pub(crate) fn check(
             )),
             (first, second) => Ok(first.or(second)),
         };
-    for id in 0..nodes.len() {
+    for &id in ids {
         let own = match nodes.node(id) {
             Node::Number(bits) => (f64::from_bits(bits) != 0.0).then_some([0.0; 4]),
             Node::Parameter(number) => {
                 Some(parameters.get(number).map_or([0.0; 4], |d| exponents(*d)))
             }
-            Node::Gap => Some([0.0, 1.0, 0.0, 0.0]),
-            Node::Rate => Some([0.0, 1.0, -1.0, 0.0]),
+            Node::Gap => Some(gap),
+            Node::Rate => Some(rate),
             Node::Of(function, a) => {
                 use crate::node::Function::{Cbrt, Sqrt};
                 let argument = known[a].unwrap_or_default();
@@ -136,14 +198,7 @@ pub(crate) fn check(
                 agree(&known, [yes, no], id, "the two values of one choice")?
             }
         };
-        known.push(own);
+        known[id] = own;
     }
-    let wanted = exponents(wanted);
-    match known[root] {
-        Some(found) if !same(found, wanted) => Err(refused(
-            root,
-            format!("it is {}, where {} is needed", words(found), words(wanted)),
-        )),
-        _ => Ok(()),
-    }
+    Ok(known)
 }

@@ -12,7 +12,7 @@
 //! let formula = Formula::parse("k*max(-d, 0)")?;
 //! assert_eq!(formula.parameters(), ["k"]);
 //! formula.check(&[Kind::Stiffness.dimension()], Kind::Force.dimension())?;
-//! let pieces = formula.pieces(&[2.0], 0.0)?;
+//! let pieces = formula.pieces(&[2.0], 0.0, false)?;
 //! assert_eq!(pieces.levels(), [0.0]);
 //! let contact = pieces.at(-3.0, 0.0);
 //! assert_eq!(pieces.force(contact, -3.0, 0.0).value, 6.0);
@@ -36,8 +36,9 @@ use nanotap_quantity::Dimension;
 pub use error::FormulaError;
 use node::{Id, Nodes};
 pub use number::{LANES, Lanes};
-use parser::{Parser, RESERVED};
+use parser::{Memory, Parser, RESERVED};
 pub use piece::{End, Exit, Pieces, Smoothness, Value};
+use piece::{Second, fixed_value};
 
 /// A formula, as read.
 #[derive(Clone, Debug)]
@@ -46,6 +47,7 @@ pub struct Formula {
     nodes: Nodes,
     root: Id,
     parameters: Vec<String>,
+    memory: Option<Memory>,
 }
 
 impl Formula {
@@ -61,6 +63,7 @@ impl Formula {
             root,
             nodes: parser.nodes,
             parameters: parser.parameters,
+            memory: parser.memory,
         })
     }
 
@@ -85,9 +88,46 @@ impl Formula {
         &self.parameters
     }
 
+    /// Returns gain `a` and decay `b` of the memory `s' = a F − b s`, for values of the parameters in any
+    /// consistent units; `None` for a formula without a memory.
+    ///
+    /// # Errors
+    /// If the gain is not finite, or the decay not positive and finite.
+    pub fn memory(&self, values: &[f64]) -> Result<Option<[f64; 2]>, FormulaError> {
+        let Some(memory) = &self.memory else {
+            return Ok(None);
+        };
+        let nodes = &memory.nodes;
+        let [gain, decay] = [memory.gain, memory.decay].map(|id| fixed_value(nodes, id, values));
+        if !(gain.is_finite() && decay > 0.0 && decay.is_finite()) {
+            let reason = format!("{} must decay at a positive rate", memory.name);
+            return Err(FormulaError::new(
+                &self.text,
+                nodes.place(memory.decay),
+                reason,
+            ));
+        }
+        Ok(Some([gain, decay]))
+    }
+
+    /// Reports whether the formula has a memory that is a length, which counts as the depth of a moving
+    /// surface: tip and sample then touch where gap and depth together are below the contact gap.
+    ///
+    /// # Errors
+    /// If the equation of the memory has parts that do not fit together.
+    pub fn moves_surface(&self, parameters: &[Dimension]) -> Result<bool, FormulaError> {
+        let of = |memory| dimension::is_length(memory, &self.text, parameters);
+        self.memory.as_ref().map_or(Ok(false), of)
+    }
+
     /// Reports whether it depends on the rate.
     pub fn depends_on_rate(&self) -> bool {
-        self.nodes.depends(self.root).rate
+        self.memory.is_none() && self.nodes.depends(self.root).rate
+    }
+
+    /// Reports whether it has a memory with an equation of its own, which then takes the place of the rate.
+    pub const fn has_memory(&self) -> bool {
+        self.memory.is_some()
     }
 
     /// Reports whether it depends on whether the tip has turned round in contact.
@@ -111,17 +151,30 @@ impl Formula {
     /// # Errors
     /// The first part that does not fit, with its place.
     pub fn check(&self, parameters: &[Dimension], wanted: Dimension) -> Result<(), FormulaError> {
-        dimension::check(&self.nodes, self.root, &self.text, parameters, wanted)
+        let (nodes, memory) = (&self.nodes, self.memory.as_ref());
+        dimension::check((nodes, self.root), memory, &self.text, parameters, wanted)
     }
 
     /// Parts the formula into analytic pieces, for values of the parameters in any consistent units.
-    /// Tip and sample touch below the gap `contact`, which is the end of a piece too.
+    /// Tip and sample touch below the gap `contact`, which is the end of a piece too; with `moves`, where
+    /// gap and memory together are below it ([`Formula::moves_surface`]).
     ///
     /// # Errors
     /// If there are too many pieces, the formula has an infinite force that attracts, or what follows
     /// after a piece depends on the speed.
-    pub fn pieces(&self, values: &[f64], contact: f64) -> Result<Pieces, FormulaError> {
-        Pieces::new(&self.text, self.nodes.clone(), self.root, values, contact)
+    pub fn pieces(
+        &self,
+        values: &[f64],
+        contact: f64,
+        moves: bool,
+    ) -> Result<Pieces, FormulaError> {
+        let nodes = self.nodes.clone();
+        let second = match &self.memory {
+            Some(_) if moves => Second::Surface,
+            Some(_) => Second::Memory,
+            None => Second::Rate,
+        };
+        Pieces::new(&self.text, nodes, self.root, values, contact, second)
     }
 }
 

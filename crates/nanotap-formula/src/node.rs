@@ -262,6 +262,43 @@ impl Nodes {
         line
     }
 
+    /// The coefficients `[a, b, c]` if the expression is `a d + b v + c` with fixed ones, without a choice.
+    pub(crate) fn plane(&mut self, id: Id) -> Option<[Id; 3]> {
+        let depends = self.depends[id];
+        if depends.chooses {
+            return None;
+        }
+        let [zero, one] = [0.0, 1.0].map(|value| self.number(value));
+        if depends.is_fixed() {
+            return Some([zero, zero, id]);
+        }
+        match self.all[id] {
+            Node::Gap => Some([one, zero, zero]),
+            Node::Rate => Some([zero, one, zero]),
+            Node::Two(operator @ (Operator::Plus | Operator::Minus), a, b) => {
+                let (a, b) = (self.plane(a)?, self.plane(b)?);
+                Some(std::array::from_fn(|k| self.two(operator, a[k], b[k])))
+            }
+            Node::Two(Operator::Times, a, b) => {
+                let (factor, plane) = if self.depends[a].is_fixed() {
+                    (a, b)
+                } else {
+                    (b, a)
+                };
+                if !self.depends[factor].is_fixed() {
+                    return None;
+                }
+                let plane = self.plane(plane)?;
+                Some(plane.map(|part| self.two(Operator::Times, factor, part)))
+            }
+            Node::Two(Operator::Over, a, b) if self.depends[b].is_fixed() => {
+                let plane = self.plane(a)?;
+                Some(plane.map(|part| self.two(Operator::Over, part, b)))
+            }
+            _ => None,
+        }
+    }
+
     fn new_line(&mut self, id: Id) -> Option<[Id; 2]> {
         let depends = self.depends[id];
         if depends.rate || depends.chooses {

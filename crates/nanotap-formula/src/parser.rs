@@ -17,6 +17,21 @@ pub(crate) const RESERVED: [&str; 13] = [
     "d", "v", "pi", "turned", "if", "then", "else", "and", "or", "not", "min", "max", "abs",
 ];
 
+/// Name of the force in the equation of a memory.
+const FORCE: &str = "F";
+/// What such an equation can be.
+const EQUATION: &str = "a memory is driven by the force F and decays, as in `s' = (F/k - s)/tau`: of F, of itself \
+                        and of parameters, in proportion to both";
+
+/// A memory of the force, `s' = gain F − decay s`.
+#[derive(Clone, Debug)]
+pub(crate) struct Memory {
+    pub(crate) name: String,
+    pub(crate) nodes: Nodes,
+    pub(crate) gain: Id,
+    pub(crate) decay: Id,
+}
+
 /// A condition as written.
 enum Condition {
     Test(Test),
@@ -33,6 +48,11 @@ pub(crate) struct Parser<'a> {
     pub(crate) nodes: Nodes,
     pub(crate) parameters: Vec<String>,
     definitions: Vec<(String, Id)>,
+    /// Name of the memory, if there is one.
+    remembered: Option<String>,
+    /// Whether its equation is being read.
+    in_equation: bool,
+    pub(crate) memory: Option<Memory>,
 }
 
 impl<'a> Parser<'a> {
@@ -49,11 +69,20 @@ impl<'a> Parser<'a> {
             nodes: Nodes::default(),
             parameters: Vec::new(),
             definitions: Vec::new(),
+            remembered: None,
+            in_equation: false,
+            memory: None,
         })
     }
 
-    /// Definitions `name = …;` and the force.
+    /// The equation of a memory, definitions `name = …;` and the force.
     pub(crate) fn formula(&mut self) -> Result<Id, FormulaError> {
+        if let (Some((Token::Name(name), place)), Some((Token::Sign("'"), _))) =
+            (self.tokens.get(self.at), self.tokens.get(self.at + 1))
+        {
+            let (name, place) = (name.clone(), place.clone());
+            self.equation(name, place)?;
+        }
         while let (Some((Token::Name(name), place)), Some((Token::Sign("="), _))) =
             (self.tokens.get(self.at), self.tokens.get(self.at + 1))
         {
@@ -78,6 +107,10 @@ impl<'a> Parser<'a> {
                 place,
                 "only definitions `name = …` end with `;`; the force stands last, without one",
             )),
+            (Token::Sign("'"), place) => Err(self.error(
+                place,
+                "the equation of a memory stands first, as in `s' = (F/k - s)/tau; …`, and there is one",
+            )),
             (Token::Sign("="), place) => {
                 Err(self.error(place, "`=` defines a name, as in `x = -d; 2*x`"))
             }
@@ -87,6 +120,38 @@ impl<'a> Parser<'a> {
             )),
             (_, place) => Err(self.error(place, "an operator such as `*` is missing before it")),
         }
+    }
+
+    /// Reads the equation `name' = …;` of a memory.
+    fn equation(&mut self, name: String, place: Range<usize>) -> Result<(), FormulaError> {
+        if RESERVED.contains(&name.as_str()) || is_function(&name) || name == FORCE {
+            return Err(self.error(place, "this name has a meaning of its own"));
+        }
+        self.at += 2;
+        self.expect("=", "the equation of a memory reads `s' = (F/k - s)/tau;`")?;
+        self.remembered = Some(name.clone());
+        self.in_equation = true;
+        let outside = std::mem::take(&mut self.nodes);
+        let start = self.start();
+        let rate = self.sum()?;
+        self.nodes.place = self.since(start);
+        let whole = self.nodes.place.clone();
+        self.expect(";", "an equation ends with `;`, and the force follows")?;
+        let plane = self.nodes.plane(rate);
+        let [gain, growth, constant] = plane.ok_or_else(|| self.error(whole.clone(), EQUATION))?;
+        if self.nodes.value(constant) != Some(0.0) {
+            return Err(self.error(whole, EQUATION));
+        }
+        let decay = self.nodes.negative(growth);
+        let nodes = std::mem::replace(&mut self.nodes, outside);
+        self.in_equation = false;
+        self.memory = Some(Memory {
+            name,
+            nodes,
+            gain,
+            decay,
+        });
+        Ok(())
     }
 
     fn error(&self, place: Range<usize>, reason: impl Into<String>) -> FormulaError {
@@ -270,7 +335,7 @@ impl<'a> Parser<'a> {
             let inner = self.deeper(Self::single)?;
             return Ok(Condition::Not(Box::new(inner)));
         }
-        if self.takes_word("turned") {
+        if self.remembered.is_none() && self.takes_word("turned") {
             return Ok(Condition::Test(Test::Turned));
         }
         // A parenthesis begins a condition or a number.
@@ -330,7 +395,15 @@ impl<'a> Parser<'a> {
         if is_function(name) || ["min", "max", "abs"].contains(&name) {
             return Err(self.error(place, format!("a function needs its argument: {name}(…)")));
         }
+        let is_memory = self.remembered.as_deref() == Some(name);
         match name {
+            "d" | "v" | "turned" if self.in_equation => Err(self.error(place, EQUATION)),
+            FORCE if self.in_equation => Ok(self.nodes.add(Node::Gap)),
+            _ if is_memory => Ok(self.nodes.add(Node::Rate)),
+            "v" | "turned" if self.remembered.is_some() => Err(self.error(
+                place,
+                "a force with a memory depends on the gap and the memory alone",
+            )),
             "d" => Ok(self.nodes.add(Node::Gap)),
             "v" => Ok(self.nodes.add(Node::Rate)),
             "pi" => Ok(self.nodes.number(std::f64::consts::PI)),

@@ -53,6 +53,17 @@ pub struct Exit {
     pub target: usize,
 }
 
+/// The second argument of a formula.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Second {
+    /// The rate of the gap.
+    Rate,
+    /// A memory.
+    Memory,
+    /// A memory that is the depth of the surface.
+    Surface,
+}
+
 /// A number with its derivatives by gap and rate.
 pub type Value = Dual<2>;
 
@@ -126,6 +137,8 @@ struct Piece {
     /// Behaviour at its lower and upper end.
     ends: [Smoothness; 2],
     touches: bool,
+    /// Its behaviour at conditions on gap and memory, by their tests.
+    onsets: Vec<(Id, Smoothness)>,
 }
 
 /// A formula with values of its parameters, as analytic pieces; those at large gaps come first.
@@ -161,6 +174,7 @@ struct Undecided {
 struct Choosing<'a> {
     nodes: &'a mut Nodes,
     known: &'a HashMap<Id, Known>,
+    aliases: &'a HashMap<Id, (Id, bool)>,
     interval: usize,
     turned: bool,
     decided: &'a [(Id, Id, bool)],
@@ -198,6 +212,9 @@ impl Choosing<'_> {
     }
 
     fn truth(&mut self, test: Id) -> Result<bool, Undecided> {
+        if let Some(&(other, same)) = self.aliases.get(&test) {
+            return Ok(self.truth(other)? == same);
+        }
         match self.known.get(&test) {
             Some(Known::Always(truth)) => return Ok(*truth),
             Some(Known::Level { number, above }) => return Ok((self.interval > *number) == *above),
@@ -221,10 +238,24 @@ impl Pieces {
         root: Id,
         values: &[f64],
         contact: f64,
+        second: Second,
     ) -> Result<Self, FormulaError> {
         let refuse = |place, reason: &str| Err(FormulaError::new(text, place, reason));
         // Gaps at which a choice changes, in order, and where contact begins.
         let mut found: Vec<(f64, Option<Evaluated>)> = vec![(contact, None)];
+        let remembers_force = second != Second::Rate;
+        // Of conditions on gap and memory that are one, the first stands for all.
+        let mut planes: Vec<(Id, [f64; 3])> = Vec::new();
+        let mut aliases: HashMap<Id, (Id, bool)> = HashMap::new();
+        let outside = (second == Second::Surface).then(|| {
+            found.clear();
+            let [gap, depth] = [Node::Gap, Node::Rate].map(|node| nodes.add(node));
+            let height = nodes.two(Operator::Plus, gap, depth);
+            let contact_gap = nodes.number(contact);
+            let outside = nodes.two(Operator::Minus, height, contact_gap);
+            planes.push((outside, [1.0, 1.0, -contact]));
+            outside
+        });
         let mut of_test: HashMap<Id, (f64, f64)> = HashMap::new();
         let mut known: HashMap<Id, Known> = HashMap::new();
         for id in 0..nodes.len() {
@@ -237,6 +268,18 @@ impl Pieces {
             };
             nodes.place = nodes.place(test);
             let Some([slope, constant]) = nodes.line(test) else {
+                let plane = nodes.plane(test).filter(|_| remembers_force);
+                if let Some(plane) =
+                    plane.map(|plane| plane.map(|id| fixed_value(&nodes, id, values)))
+                {
+                    match planes.iter().find(|(_, other)| is_parallel(plane, *other)) {
+                        Some(&(other, _)) if other == test => {}
+                        Some((other, known)) => {
+                            aliases.insert(test, (*other, (plane[1] > 0.0) == (known[1] > 0.0)));
+                        }
+                        None => planes.push((test, plane)),
+                    }
+                }
                 continue;
             };
             let [slope_value, constant_value] =
@@ -275,7 +318,11 @@ impl Pieces {
             let (number, above) = (number(gap), slope > 0.0);
             known.insert(test, Known::Level { number, above });
         }
-        let contact = number(contact);
+        let contact = if outside.is_some() {
+            usize::MAX
+        } else {
+            number(contact)
+        };
         let remembers = nodes.depends(root).turned;
         let mut pieces = Self {
             all: Vec::new(),
@@ -291,11 +338,16 @@ impl Pieces {
                 if turned && !(remembers && interval <= contact) {
                     continue;
                 }
-                let mut open = vec![Vec::new()];
+                let mut open = match outside {
+                    // Those without contact come first.
+                    Some(test) => vec![vec![(test, test, false)], vec![(test, test, true)]],
+                    None => vec![Vec::new()],
+                };
                 while let Some(decided) = open.pop() {
                     let mut choosing = Choosing {
                         nodes: &mut nodes,
                         known: &known,
+                        aliases: &aliases,
                         interval,
                         turned,
                         decided: &decided,
@@ -337,14 +389,27 @@ impl Pieces {
             pieces.all[k].ends = ends.map(|level| {
                 let gap = level.and_then(|level| pieces.levels.get(level));
                 gap.map_or(Smoothness::Analytic, |gap| {
-                    smoothness(&nodes, *root, *gap, values)
+                    smoothness(&nodes, *root, [*gap, 1.0], values)
                 })
             });
+            let place = |test: Id| {
+                let (_, [slope, _, constant]) = planes.iter().find(|(other, _)| *other == test)?;
+                Some(-constant / slope).filter(|gap| gap.is_finite())
+            };
+            let tests = pieces.all[k]
+                .guards
+                .iter()
+                .map(|&number| pieces.guards[number].test);
+            pieces.all[k].onsets = tests
+                .filter_map(|test| {
+                    Some((test, smoothness(&nodes, *root, [place(test)?, 0.0], values)))
+                })
+                .collect();
             pieces.all[k].exits = pieces
                 .exits_of(k)
                 .map_err(|reason| FormulaError::new(text, nodes.place(*root), reason))?;
         }
-        pieces.find_pole(text, &nodes, &roots, values)?;
+        pieces.find_pole(text, &nodes, &roots, values, remembers_force)?;
         Ok(pieces)
     }
 
@@ -370,7 +435,12 @@ impl Pieces {
             guards: (first..self.guards.len()).collect(),
             exits: Vec::new(),
             ends: [Smoothness::Analytic; 2],
-            touches: interval <= self.contact,
+            // Of a moving surface the first condition tells.
+            touches: match decided.first() {
+                Some((.., outside)) if self.contact == usize::MAX => !outside,
+                _ => interval <= self.contact,
+            },
+            onsets: Vec::new(),
         });
     }
 
@@ -476,6 +546,7 @@ impl Pieces {
         nodes: &Nodes,
         roots: &[Id],
         values: &[f64],
+        remembers_force: bool,
     ) -> Result<(), FormulaError> {
         for (piece, root) in self.all.iter().zip(roots) {
             let lower = piece
@@ -487,7 +558,14 @@ impl Pieces {
                 .get(piece.interval)
                 .copied()
                 .unwrap_or(f64::INFINITY);
-            for (id, gap) in poles(nodes, *root, values, [lower, upper], &self.levels) {
+            for (id, gap) in poles(
+                nodes,
+                *root,
+                values,
+                [lower, upper],
+                &self.levels,
+                remembers_force,
+            ) {
                 if self.pole.is_some_and(|pole| pole >= gap) {
                     continue;
                 }
@@ -501,6 +579,10 @@ impl Pieces {
                 } else {
                     f64::MIN_POSITIVE.sqrt()
                 };
+                // Beyond a condition on gap and memory the piece is not reached.
+                if remembers_force && !self.holds(piece, near, 0.0) {
+                    continue;
+                }
                 if near < upper && piece.force.value(near, 0.0) < 0.0 {
                     let part = text.get(nodes.place(id)).unwrap_or_default();
                     let reason = format!(
@@ -599,6 +681,15 @@ impl Pieces {
         self.all[piece].ends
     }
 
+    /// Returns the behaviour of a piece that is entered through a condition of another.
+    pub fn onset(&self, guard: usize, target: usize) -> Smoothness {
+        let test = self.guards[guard].test;
+        let mut onsets = self.all[target].onsets.iter();
+        onsets
+            .find(|(other, _)| *other == test)
+            .map_or(Smoothness::Analytic, |(_, smoothness)| *smoothness)
+    }
+
     /// Returns a condition with its derivatives by gap and rate; positive inside its piece.
     pub fn guard(&self, number: usize, gap: f64, rate: f64) -> Value {
         let guard = &self.guards[number];
@@ -644,17 +735,23 @@ fn is_same(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_LEVEL * a.abs().max(b.abs())
 }
 
-/// The value of an expression of the parameters alone.
-fn fixed_value(nodes: &Nodes, id: Id, values: &[f64]) -> f64 {
-    values_of(nodes, &needed(nodes, id), values, 0.0)[&id]
+/// Whether two conditions `a d + b s + c > 0` change their truth together.
+fn is_parallel(first: [f64; 3], second: [f64; 3]) -> bool {
+    let ratio = second[1] / first[1];
+    ratio.is_finite() && (0..3).all(|k| is_same(ratio * first[k], second[k]))
 }
 
-/// The lowest power of the distance from a gap, and the lowest fractional one, with which an expression
-/// begins there.
-fn smoothness(nodes: &Nodes, root: Id, gap: f64, values: &[f64]) -> Smoothness {
+/// The value of an expression of the parameters alone.
+pub(crate) fn fixed_value(nodes: &Nodes, id: Id, values: &[f64]) -> f64 {
+    values_of(nodes, &needed(nodes, id), values, [0.0; 2])[&id]
+}
+
+/// The lowest power of the distance from a gap, at a rate, and the lowest fractional one, with which an
+/// expression begins there.
+fn smoothness(nodes: &Nodes, root: Id, place: [f64; 2], values: &[f64]) -> Smoothness {
     let mut orders: HashMap<Id, (f64, f64)> = HashMap::new();
     let all = needed(nodes, root);
-    let at = values_of(nodes, &all, values, gap);
+    let at = values_of(nodes, &all, values, place);
     for id in all {
         let value = at[&id];
         let small = |a: Id, b: Id| value.abs() <= 1e-12 * at[&a].abs().max(at[&b].abs());
@@ -711,12 +808,13 @@ fn poles(
     values: &[f64],
     [lower, upper]: [f64; 2],
     levels: &[f64],
+    remembers_force: bool,
 ) -> Vec<(Id, f64)> {
     let mut found = Vec::new();
     let mut divisors: Vec<(Id, Id)> = Vec::new();
     let mut scratch = nodes.clone();
     let all = needed(nodes, root);
-    let fixed = values_of(nodes, &all, values, 0.0);
+    let fixed = values_of(nodes, &all, values, [0.0, 1.0]);
     for id in all {
         match nodes.node(id) {
             Node::Two(Operator::Over, _, b) => divisors.push((b, b)),
@@ -728,7 +826,7 @@ fn poles(
     let mut seen = HashSet::new();
     while let Some((whole, id)) = divisors.pop() {
         let depends = nodes.depends(id);
-        if !depends.gap || depends.rate || !seen.insert(id) {
+        if !depends.gap || depends.rate && !remembers_force || !seen.insert(id) {
             continue;
         }
         match nodes.node(id) {

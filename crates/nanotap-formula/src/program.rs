@@ -321,12 +321,12 @@ pub(crate) fn needed(nodes: &Nodes, root: Id) -> Vec<Id> {
     (0..=root).filter(|id| is_needed[*id]).collect()
 }
 
-/// The values of expressions without choices, each after its parts, at one gap and a rate of 1.
+/// The values of expressions without choices, each after its parts, at one gap and rate.
 pub(crate) fn values_of(
     nodes: &Nodes,
     all: &[Id],
     parameters: &[f64],
-    gap: f64,
+    [gap, rate]: [f64; 2],
 ) -> HashMap<Id, f64> {
     let mut values: HashMap<Id, f64> = HashMap::with_capacity(all.len());
     for &id in all {
@@ -334,7 +334,7 @@ pub(crate) fn values_of(
             Node::Number(bits) => f64::from_bits(bits),
             Node::Parameter(number) => parameters[number],
             Node::Gap => gap,
-            Node::Rate => 1.0,
+            Node::Rate => rate,
             Node::Of(function, a) => function.at(values[&a]),
             Node::Two(operator, a, b) => {
                 let (a, b) = (values[&a], values[&b]);

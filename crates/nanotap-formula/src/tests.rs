@@ -6,7 +6,10 @@ use crate::{End, Formula, LANES, Lanes, Pieces, Smoothness};
 
 /// The pieces of a formula with contact below 0, and values in the order of its parameters.
 fn pieces(text: &str, values: &[f64]) -> Pieces {
-    Formula::parse(text).unwrap().pieces(values, 0.0).unwrap()
+    Formula::parse(text)
+        .unwrap()
+        .pieces(values, 0.0, false)
+        .unwrap()
 }
 
 fn value(text: &str, values: &[f64], gap: f64, rate: f64) -> f64 {
@@ -16,8 +19,8 @@ fn value(text: &str, values: &[f64], gap: f64, rate: f64) -> f64 {
 
 fn refusal(text: &str) -> String {
     let refused = Formula::parse(text);
-    let refused =
-        refused.and_then(|formula| formula.pieces(&vec![0.5; formula.parameters().len()], 0.0));
+    let refused = refused
+        .and_then(|formula| formula.pieces(&vec![0.5; formula.parameters().len()], 0.0, false));
     refused.unwrap_err().to_string()
 }
 
@@ -61,7 +64,7 @@ fn derivatives_are_those_of_differences() {
     let formula = Formula::parse(text).unwrap();
     assert_eq!(formula.parameters(), ["a", "k", "c", "w", "h", "n"]);
     let values = [0.7, 2.0, 0.3, 1.3, 0.4, 1.7];
-    let pieces = formula.pieces(&values, 0.0).unwrap();
+    let pieces = formula.pieces(&values, 0.0, false).unwrap();
     let step = 1e-6;
     for (gap, rate) in [(0.3, -0.8), (0.31, 0.9), (1.1, -0.2), (-0.4, 0.5)] {
         let piece = pieces.at(gap, rate);
@@ -84,7 +87,7 @@ fn derivatives_are_those_of_differences() {
                 let mut values = values;
                 values[k] += step;
                 formula
-                    .pieces(&values, 0.0)
+                    .pieces(&values, 0.0, false)
                     .unwrap()
                     .value(piece, gap, rate)
             };
@@ -305,7 +308,10 @@ fn repeated_names_cost_nothing() {
     }
     text += "max(x60, 0)*y60/(y60 + a)";
     let formula = Formula::parse(&text).unwrap();
-    assert_eq!(formula.pieces(&[1.0], 0.0).unwrap().levels(), [-1.0, 0.0]);
+    assert_eq!(
+        formula.pieces(&[1.0], 0.0, false).unwrap().levels(),
+        [-1.0, 0.0]
+    );
 }
 
 /// Whatever is put together at random is read or refused, and what is read is parted or refused: no panic,
@@ -343,7 +349,7 @@ fn random_texts_are_read_or_refused() {
         let values = vec![0.7; formula.parameters().len()];
         let dimensions = vec![Dimension::NONE; values.len()];
         let _ = formula.check(&dimensions, Kind::Force.dimension());
-        let Ok(pieces) = formula.pieces(&values, 0.1) else {
+        let Ok(pieces) = formula.pieces(&values, 0.1, false) else {
             continue;
         };
         parted += 1;

@@ -14,8 +14,8 @@ pub(crate) enum Token {
 }
 
 /// Signs, the longer ones first.
-const SIGNS: [&str; 17] = [
-    "**", "<=", ">=", "+", "-", "−", "*", "·", "/", "^", "(", ")", ",", ";", "<", ">", "=",
+const SIGNS: [&str; 18] = [
+    "'", "**", "<=", ">=", "+", "-", "−", "*", "·", "/", "^", "(", ")", ",", ";", "<", ">", "=",
 ];
 
 /// Parts a text into tokens, each with its place.

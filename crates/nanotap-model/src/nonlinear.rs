@@ -1110,7 +1110,7 @@ impl Nonlinear {
         let kernel = self.system.kernel();
         let (row, column, surface) = (kernel.row(), kernel.column(), kernel.surface());
         let n = (self.system.dimension() - surface) / 2;
-        // Of the force onto the law's second argument: the gap's rate, or a surface in contact.
+        // Of the force onto the law's second argument: the gap's rate, or a surface that it presses.
         let onto: f64 = if surface == 0 {
             (0..n).map(|j| row[j] * column[n + j]).sum()
         } else {
@@ -1120,7 +1120,7 @@ impl Nonlinear {
             let second = self
                 .system
                 .second_argument(s.time, s.rate, s.state.as_slice());
-            let acts = surface == 0 || self.contact[s.branch];
+            let acts = surface == 0 || self.system.presses(s.branch);
             let slope = law.force(s.branch, s.gap, second).by_rate;
             out[0] = if acts { slope } else { 0.0 };
         });

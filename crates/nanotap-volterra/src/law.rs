@@ -87,7 +87,7 @@ pub struct Remark {
 }
 
 /// The surface of a sample that relaxes, as decaying coordinates `η̇ = −rate η + gain F_s` that the
-/// tip's force `F_s` on the surface drives in contact. Their sum is the surface's depth to the
+/// tip's force `F_s` on the surface drives, in contact or at every gap. Their sum is the surface's depth to the
 /// power of the contact law, and takes the place of the gap's rate in the law.
 #[derive(Clone, Debug)]
 pub struct Surface {
@@ -95,6 +95,8 @@ pub struct Surface {
     pub rates: Vec<f64>,
     /// Growth rates of the coordinates under a unit force; one per coordinate.
     pub gains: Vec<f64>,
+    /// Whether the force drives the surface at every gap, and not in contact alone.
+    pub always: bool,
     /// Constant part of the force in contact that does not act on the surface, in the unit of
     /// force; negative for an attraction.
     pub adhesion: f64,

@@ -63,8 +63,8 @@ pub struct System {
     kernel: Arc<Kernel>,
     /// Kernel and forced response of the surface while it is free, if it relaxes.
     free: Option<Box<FreeSurface>>,
-    /// Whether tip and sample touch, by branch.
-    touches: Vec<bool>,
+    /// Whether the force acts on the surface, if it relaxes, by branch.
+    presses: Vec<bool>,
     law: Arc<dyn ForceLaw>,
     drive: Drive,
     options: Options,
@@ -279,6 +279,8 @@ impl System {
             });
         }
         let exits: Vec<Vec<Exit>> = (0..branches).map(|b| law.exits(b)).collect();
+        let always = law.surface().is_some_and(|surface| surface.always);
+        let presses = (0..branches).map(|b| always || law.touches(b)).collect();
         let tones: Vec<(f64, DVector<Complex>)> = drive
             .tones
             .iter()
@@ -302,7 +304,7 @@ impl System {
         Ok(Self {
             gap_constant: drive.offset + forced_gap,
             vanishes: (0..branches).map(|b| law.vanishes(b)).collect(),
-            touches: (0..branches).map(|b| law.touches(b)).collect(),
+            presses,
             free,
             forced: response.to_state(&kernel),
             takes_signal: law.takes_signal(),
@@ -394,14 +396,19 @@ impl System {
     /// Returns the kernel on a branch of the law.
     pub(crate) fn kernel_on(&self, branch: usize) -> &Arc<Kernel> {
         match &self.free {
-            Some(free) if !self.touches[branch] => &free.kernel,
+            Some(free) if !self.presses[branch] => &free.kernel,
             _ => &self.kernel,
         }
     }
 
+    /// Reports whether the force on a branch acts on the surface of a sample that relaxes.
+    pub fn presses(&self, branch: usize) -> bool {
+        self.presses[branch]
+    }
+
     /// Returns the constant part of the force on a branch that does not act on the surface.
     pub(crate) fn adhesion(&self, branch: usize) -> f64 {
-        let pressed = self.free.as_ref().filter(|_| self.touches[branch]);
+        let pressed = self.free.as_ref().filter(|_| self.presses[branch]);
         pressed.map_or(0.0, |surface| surface.adhesion)
     }
 

@@ -200,10 +200,11 @@ impl StaticCurve {
                 let mut state = state.as_slice().to_vec();
                 if let Some(surface) = law.nonlinear.system.law().surface() {
                     let contact = law.nonlinear.static_law().touches(rest.branch);
+                    let presses = contact || surface.always;
                     let pressed = rest.force - surface.adhesion;
                     let first = state.len() - surface.rates.len();
                     for k in first..state.len() {
-                        state[k] = if contact {
+                        state[k] = if presses {
                             law.state[1][k] * pressed
                         } else {
                             0.0

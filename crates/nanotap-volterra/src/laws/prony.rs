@@ -401,6 +401,7 @@ impl Prony {
             surface: Surface {
                 rates: modes.iter().map(|(rate, _)| *rate).collect(),
                 gains: modes.iter().map(|(_, gain)| gain / stiffness).collect(),
+                always: false,
                 adhesion: 0.0,
                 relaxed: Arc::new(Law::new(Elastic(shape), relaxed.to_vec())),
             },

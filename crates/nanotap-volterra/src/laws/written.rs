@@ -3,6 +3,9 @@
 //! The formula is parted into analytic branches at its conditions ([`nanotap_formula`]); derivatives
 //! are those of the formula. Tip and sample touch below the contact distance.
 //!
+//! A memory `s' = a F − b s` is a coordinate of a [`Surface`] that the force drives at every gap. It takes
+//! the place of the rate in the law.
+//!
 //! What is written is kept for as long as the program runs, each text with its parameters once, so that
 //! its law is one of the table's for all that read the table.
 
@@ -18,7 +21,7 @@ use nanotap_formula::{
 use nanotap_quantity::{Dimension, Kind};
 
 use crate::error::VolterraError;
-use crate::law::{Approach, Exit, Force, ForceLaw, Guard};
+use crate::law::{Approach, Exit, Force, ForceLaw, Guard, Surface};
 use crate::laws::adhesion::HAMAKER;
 use crate::laws::entry::{
     CONTACT_DISTANCE, CaseKey, Entry, KeyEntry, MODULUS, POISSON, ParameterEntry, RADIUS, Range,
@@ -74,6 +77,8 @@ pub struct Writing {
     places: Vec<usize>,
     /// Number of the law's parameter that tells where contact begins; without one the surfaces meet there.
     contact: Option<usize>,
+    /// Whether the formula's memory is the depth of the surface.
+    moves: bool,
     entry: &'static Entry,
 }
 
@@ -126,6 +131,7 @@ pub fn law(
         }));
     }
     formula.check(&dimensions, Kind::Force.dimension())?;
+    let moves = formula.moves_surface(&dimensions)?;
     let mut laws = laws();
     if laws.len() >= MAX_KEPT {
         return Err(full(&formula, ""));
@@ -133,13 +139,14 @@ pub fn law(
     let entry: &'static Entry = Box::leak(Box::new(Entry {
         formula: text.to_owned().leak(),
         parameters: entries.leak(),
-        conservative: !formula.depends_on_rate() && !formula.remembers(),
+        conservative: !takes_second(&formula) && !formula.remembers(),
         ..*FORMULA.entry
     }));
     let writing = Box::leak(Box::new(Writing {
         formula,
         places,
         contact: Some(0),
+        moves,
         entry,
     }));
     let law = Box::leak(Box::new(TableLaw {
@@ -211,9 +218,10 @@ impl Writing {
         let dimensions: Vec<_> = places.iter().map(dimension).collect();
         formula.check(&dimensions, Kind::Force.dimension())?;
         Ok(Self {
-            formula,
             places,
             contact: place(contact),
+            moves: formula.moves_surface(&dimensions)?,
+            formula,
             entry,
         })
     }
@@ -229,13 +237,31 @@ impl Writing {
         parameters: &[f64],
     ) -> Result<Arc<dyn ForceLaw>, VolterraError> {
         let values: Vec<f64> = self.places.iter().map(|&place| parameters[place]).collect();
+        let contact = self.contact.map_or(0.0, |place| parameters[place]);
+        let pieces = self.formula.pieces(&values, contact, self.moves)?;
+        let surface = self.formula.memory(&values)?.map(|[gain, decay]| Surface {
+            rates: vec![decay],
+            gains: vec![gain],
+            always: true,
+            adhesion: 0.0,
+            relaxed: Arc::new(AtRest {
+                pieces: pieces.clone(),
+                compliance: gain / decay,
+                contact,
+                entry: self.entry,
+            }),
+        });
         Ok(Arc::new(Written {
-            pieces: self
-                .formula
-                .pieces(&values, self.contact.map_or(0.0, |place| parameters[place]))?,
             writing: self,
+            pieces,
+            surface,
         }))
     }
+}
+
+/// Reports whether a formula depends on the rate or on a memory.
+fn takes_second(formula: &Formula) -> bool {
+    formula.depends_on_rate() || formula.has_memory()
 }
 
 /// The law of a formula; see the module.
@@ -243,6 +269,7 @@ impl Writing {
 struct Written {
     writing: &'static Writing,
     pieces: Pieces,
+    surface: Option<Surface>,
 }
 
 /// Evaluates [`ForceLaw::forces`] of a formula, compiled also for wide registers.
@@ -259,7 +286,7 @@ fn forces_at(
         let to = &mut to[first..count.min(first + LANES)];
         to.copy_from_slice(&from[..to.len()]);
     };
-    if law.writing.formula.depends_on_rate() {
+    if takes_second(&law.writing.formula) {
         law.pieces
             .forces(branch, gaps, rates, |first, forces: &Lanes<2>| {
                 put(values, first, &forces.values);
@@ -316,7 +343,11 @@ impl ForceLaw for Written {
     }
 
     fn depends_on_rate(&self) -> bool {
-        self.writing.formula.depends_on_rate()
+        takes_second(&self.writing.formula)
+    }
+
+    fn surface(&self) -> Option<&Surface> {
+        self.surface.as_ref()
     }
 
     fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: [&mut [f64]; 3]) {
@@ -343,7 +374,14 @@ impl ForceLaw for Written {
                     Exit::new(guard, *target).with(upper, lower_after)
                 }
                 End::Turns => Exit::new(Guard::Turns, *target),
-                End::Guard(number) => Exit::new(Guard::Own(number), *target),
+                End::Guard(number) => {
+                    let onset = match self.pieces.onset(number, *target) {
+                        Smoothness::Analytic => Approach::Analytic,
+                        // No switch pins the gap here, so that a power below 1 is like one above.
+                        _ => Approach::ThreeHalves,
+                    };
+                    Exit::new(Guard::Own(number), *target).with(Approach::Analytic, onset)
+                }
             }
         };
         self.pieces.exits(branch).iter().map(exit).collect()
@@ -363,6 +401,10 @@ impl ForceLaw for Written {
     }
 
     fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]) {
+        if self.surface.is_some() {
+            // The memory's own equation changes, too, which no derivative of the force describes.
+            return out.fill(f64::NAN);
+        }
         out.fill(0.0);
         for (parameter, &place) in self.writing.places.iter().enumerate() {
             out[place] = self.pieces.by_parameter(branch, parameter, gap, rate);
@@ -446,6 +488,90 @@ impl ForceLaw for Written {
 
     fn conservative(&self) -> bool {
         self.writing.entry.conservative
+    }
+}
+
+/// The force of a formula whose memory has settled, `s = compliance F`.
+#[derive(Clone, Debug)]
+struct AtRest {
+    pieces: Pieces,
+    compliance: f64,
+    contact: f64,
+    entry: &'static Entry,
+}
+
+/// Factor by which the size of a force is increased in search of one that holds itself.
+const LARGER: f64 = 1.25;
+/// Largest number of times.
+const MAX_LARGER: usize = 200;
+
+impl AtRest {
+    /// The smallest force that the memory it leaves behind confirms, with its slope.
+    fn settled(&self, gap: f64) -> Force {
+        let at = |force: f64| {
+            let memory = self.compliance * force;
+            self.pieces.force(self.pieces.at(gap, memory), gap, memory)
+        };
+        let first = at(0.0).value;
+        let exceeds = |force: f64| (at(force).value - force) * first.signum() > 0.0;
+        let (mut low, mut high) = (0.0, first);
+        for _ in 0..MAX_LARGER {
+            if !exceeds(high) {
+                break;
+            }
+            (low, high) = (high, LARGER * high);
+        }
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle == low || middle == high || !middle.is_finite() {
+                break;
+            }
+            *(if exceeds(middle) { &mut low } else { &mut high }) = middle;
+        }
+        let force = at(high);
+        Force {
+            value: high,
+            by_gap: force.slopes[0] / (1.0 - self.compliance * force.slopes[1]),
+            by_rate: 0.0,
+        }
+    }
+}
+
+impl ForceLaw for AtRest {
+    fn parameters(&self) -> Vec<&'static str> {
+        self.entry.parameters.iter().map(|p| p.name).collect()
+    }
+
+    fn branches(&self) -> usize {
+        2
+    }
+
+    fn branch_at(&self, gap: f64, _: f64) -> usize {
+        usize::from(gap < self.contact)
+    }
+
+    fn force(&self, _: usize, gap: f64, _: f64) -> Force {
+        self.settled(gap)
+    }
+
+    fn depends_on_rate(&self) -> bool {
+        false
+    }
+
+    fn exits(&self, branch: usize) -> Vec<Exit> {
+        vec![match branch {
+            0 => Exit::new(Guard::Falls(self.contact), 1),
+            _ => Exit::new(Guard::Rises(self.contact), 0),
+        }]
+    }
+
+    /// Writes NaN: the memory's equation changes, too.
+    fn by_parameters(&self, _: usize, _: f64, _: f64, out: &mut [f64]) {
+        out.fill(f64::NAN);
+    }
+
+    fn guard_by_parameters(&self, _: usize, _: usize, _: f64, _: f64, out: &mut [f64]) {
+        out.fill(f64::NAN);
     }
 }
 

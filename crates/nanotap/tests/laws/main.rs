@@ -11,6 +11,7 @@ mod common;
 mod derivatives;
 mod frequency_modulation;
 mod grazing;
+mod memory;
 mod permanent_contact;
 mod prony;
 mod reference;

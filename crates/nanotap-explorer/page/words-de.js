@@ -68,6 +68,7 @@ export const german = {
       "R, E, nu, H und a0 sind die Werte von Spitze und Probe. Jeder andere Name ist ein eigener Parameter.",
       "+ − * / ^, sqrt, cbrt, exp, ln, sin, cos, tan, atan, sinh, cosh, tanh, abs, min, max, step, pi.",
       "if d < 0 then … else …; „turned“ gilt, sobald sich die Spitze im Kontakt zurückzieht. Eine Definition endet mit einem Semikolon: x = d/a; k*x.",
+      "s' = (F/ks - s)/tau; vor der Kraft ist ein Gedächtnis, das die Kraft F antreibt, etwa eine nachgebende Oberfläche: Der Abstand zu ihr ist d + s.",
     ],
   },
   families: {

@@ -71,6 +71,7 @@ const english = {
       "R, E, nu, H and a0 are the values of tip and sample. Every other name is a parameter of your own.",
       "+ − * / ^, sqrt, cbrt, exp, ln, sin, cos, tan, atan, sinh, cosh, tanh, abs, min, max, step, pi.",
       "if d < 0 then … else …; “turned” is true once the tip withdraws in contact. A definition ends with a semicolon: x = d/a; k*x.",
+      "s' = (F/ks - s)/tau; before the force is a memory that the force F drives, such as a surface that gives way: the gap to it is d + s.",
     ],
   },
   /** Families of laws, and the words for each law; its formula and its name in the file are next to it. */

@@ -275,7 +275,7 @@ follows! {
     the_signals_of_one_shot: "one-shot.md", 2 commands, 9 numbers;
     q_control: "q-control.md", 3 commands, 7 numbers;
     the_scan: "scan.md", 3 commands, 25 numbers;
-    the_formulas: "formula.md", 12 commands, 22 numbers;
+    the_formulas: "formula.md", 13 commands, 25 numbers;
     the_states_of_an_image: "image-states.md", 2 commands, 12 numbers;
     the_force_table: "table.md", 3 commands, 8 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;

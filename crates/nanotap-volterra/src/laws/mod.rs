@@ -314,8 +314,12 @@ pub fn build_sum(
         return relaxing.with_attraction(&law).ok_or(VolterraError::Sum {
             first: own.name,
             second: others.next().map_or("", |(other, _)| other.name),
-            reason: "to a sample that relaxes only forces of the gap alone can be added that are \
-                     constant in contact and have the same intermolecular distance",
+            reason: if relaxing.surface().is_some_and(|surface| surface.always) {
+                "the formula has a memory of its own force: write the whole force in it"
+            } else {
+                "to a sample that relaxes only forces of the gap alone can be added that are \
+                     constant in contact and have the same intermolecular distance"
+            },
         });
     }
     Ok(Arc::new(sum::Sum::new(

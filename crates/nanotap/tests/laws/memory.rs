@@ -178,7 +178,7 @@ fn derivatives_agree_with_differences() {
     for words in [&SURFACE[..], &DEPOSIT] {
         let case = case(words);
         let found = found(&case);
-        let tau = Key::find("sample.parameters.tau").unwrap();
+        let tau = case.key("sample.parameters.tau").unwrap();
         let keys = [Key::GapTip, Key::DriveFrequency, tau];
         let error = worst(&case, &keys, &found.state);
         assert!(error < 1e-6, "{error}");

@@ -39,6 +39,17 @@ impl EnergyBalance {
         residual: f64::NAN,
     };
 
+    /// The balance of this motion and the next one, which goes on where this one ends.
+    #[must_use]
+    pub fn followed_by(&self, next: &Self) -> Self {
+        balance(
+            self.drive_work + next.drive_work,
+            self.beam_damping + next.beam_damping,
+            self.sample_damping + next.sample_damping,
+            self.stored + next.stored,
+        )
+    }
+
     /// An energy of the balance, or 0 if it is not above the error of the balance: its imbalance, which
     /// is that of the quadratures, and the rounding of the largest term.
     pub fn resolved(&self, energy: f64) -> f64 {
@@ -189,15 +200,22 @@ impl PowerTerm {
     }
 }
 
-/// Energy stored in the lever for a state at drive phase 0.
-pub(super) fn stored_by_lever(model: &Model, state: &[f64]) -> f64 {
+/// Energy stored in the lever for a state at a drive phase (as a time).
+pub(super) fn stored_by_lever(model: &Model, state: &[f64], phase: f64) -> f64 {
     let powers = model.power().first();
-    powers.map_or(0.0, |powers| total(&powers.stored, model, state, 0.0))
+    powers.map_or(0.0, |powers| total(&powers.stored, model, state, phase))
 }
 
-/// Energy stored in the sample for a state at drive phase 0 in a regime.
-pub(super) fn stored_by_sample(model: &Model, regime: usize, state: &[f64]) -> f64 {
-    total(&model.power()[regime].stored_by_sample, model, state, 0.0)
+/// Energy stored in the sample for a state at a drive phase (as a time) in a regime.
+pub(super) fn stored_by_sample(model: &Model, regime: usize, state: &[f64], phase: f64) -> f64 {
+    let powers = &model.power()[regime].stored_by_sample;
+    total(powers, model, state, phase)
+}
+
+/// The drive phase (as a time) at the end of a period: 0 again, but where the tones do not repeat.
+pub(super) fn end_phase(model: &Model) -> f64 {
+    let drive = model.system.drive();
+    if drive.repeats() { 0.0 } else { drive.period() }
 }
 
 /// Sum of products for a state at a drive phase (as a time).

@@ -14,7 +14,7 @@ use nanotap_flow::{Flow, FlowError};
 use super::begins_contact;
 use super::clearance::ClearanceSearch;
 use super::contact_event::Contacts;
-use super::energy::{Ends, stored_by_sample};
+use super::energy::{Ends, end_phase, stored_by_sample};
 use super::functional::{Functional, Requirements, Signal};
 use super::measured::{Beginnings, Impacts, MeasuredValues};
 use super::number::Phasor;
@@ -137,8 +137,8 @@ impl Run for ExactRun<'_> {
         let gain = if changes.fold(0.0, f64::max) <= CLOSED * size {
             0.0
         } else {
-            stored_by_sample(model, self.flow.regime(), &after)
-                - stored_by_sample(model, self.start.0, before)
+            stored_by_sample(model, self.flow.regime(), &after, end_phase(model))
+                - stored_by_sample(model, self.start.0, before, 0.0)
         };
         Ok(self.measurement.finish(gain)?)
     }

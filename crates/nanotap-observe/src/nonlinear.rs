@@ -8,7 +8,7 @@ use nanotap_volterra::{Flow, Node, Output, Trajectory};
 
 use super::clearance::SampledClearance;
 use super::contact_event::{ContactEvent, ContactEventKind};
-use super::energy::stored_by_lever;
+use super::energy::{end_phase, stored_by_lever};
 use super::functional::{Requirements, Signal};
 use super::measured::{Beginnings, Impacts, MeasuredValues};
 use super::number::Phasor;
@@ -53,7 +53,7 @@ impl Engine for Nonlinear<'_> {
     fn start(&self, state: &[f64], _: RecordOptions) -> Result<Box<dyn Run + '_>, MotionError> {
         let clearance = self.required.clearance;
         let clearance = clearance.then(|| SampledClearance::new(self.model, self.engine));
-        let start = (stored_by_lever(self.model, state), f64::NAN);
+        let start = (stored_by_lever(self.model, state, 0.0), f64::NAN);
         Ok(Box::new(NonlinearRun {
             of: self,
             flow: Flow::new(Arc::clone(&self.engine.system)),
@@ -115,7 +115,7 @@ impl Run for NonlinearRun<'_> {
             self.energies[0].1 = energy(start).unwrap_or(0.0);
         }
         self.energies[1] = (
-            stored_by_lever(self.of.model, &self.state),
+            stored_by_lever(self.of.model, &self.state, end_phase(self.of.model)),
             energy(end).unwrap_or(0.0),
         );
         self.periods += 1;

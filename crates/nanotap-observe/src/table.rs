@@ -216,6 +216,9 @@ macro_rules! observables {
                     | 1 << Row::gap_range as usize,
             );
 
+            /// The balance of the energies of the whole motion.
+            pub const ENERGY_BALANCE: Self = Self(1 << Row::energy_balance as usize);
+
             /// Minimum and maximum of the gap.
             pub(super) const GAP: Self = Self(1 << Row::gap_range as usize);
 

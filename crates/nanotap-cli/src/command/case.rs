@@ -314,7 +314,10 @@ fn lever_rows(given: &mut Table, view: &Physical) {
     let table = ModeTable::new(case).ok();
     let first = table.as_ref().and_then(|table| {
         let [real, imaginary] = *table.free_eigenvalues.as_ref()?.first()?;
-        Some((real.hypot(imaginary), *table.quality.as_ref()?.first()?))
+        Some((
+            (real * real + imaginary * imaginary).sqrt(),
+            *table.quality.as_ref()?.first()?,
+        ))
     });
     if let (true, Some((resonance, quality))) = (case.has_q_control(), first) {
         let frequency = Kind::Frequency.format(resonance * view.scales.frequency);

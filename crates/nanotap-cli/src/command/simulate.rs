@@ -186,6 +186,22 @@ fn one_shot_text(case: &GivenCase, run: &OneShot) -> String {
         range(Kind::Force, seen.least_force, seen.peak_force),
         "negative where the sample attracts",
     );
+    let energies = [
+        (
+            "work of the drive",
+            seen.energy_balance.drive_work,
+            "over the whole run",
+        ),
+        ("lost in the lever", seen.energy_balance.beam_damping, ""),
+        ("lost in the sample", seen.energy_balance.sample_damping, ""),
+    ];
+    for (what, energy, note) in energies {
+        row(
+            what,
+            shown(Kind::Energy, seen.energy_balance.resolved(energy), 5),
+            note,
+        );
+    }
     text + "\n" + &table.render()
 }
 

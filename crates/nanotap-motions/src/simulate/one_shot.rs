@@ -1,8 +1,8 @@
 //! A motion under a signal of one shot: the transient while it lasts, and the ring-down after it.
 //!
 //! The lever begins at rest, or in a given state, and the signal takes the place of the periodic
-//! drive. Nothing repeats, so that no orbit, phase or energy per period is reported; extremes and
-//! contacts are those of the whole run, as exact as under a periodic drive.
+//! drive. Nothing repeats, so that no orbit, phase or energy per period is reported; extremes,
+//! contacts and energies are those of the whole run, as exact as under a periodic drive.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -148,7 +148,7 @@ fn follow(
             break;
         };
         let model = driven.model()?;
-        let set = OutOfRange::observed_with(&model, ObservableSet::EXTREMES);
+        let set = OutOfRange::observed_with(&model, OBSERVED);
         let recorded = record(&model, &state, 1, set, kept)?;
         let pieces = recorded.recording.pieces();
         let touches = |of: Option<&MotionPiece>| of.map(|of| model.touches(of.regime));
@@ -170,6 +170,9 @@ fn follow(
     }
     Ok(state)
 }
+
+/// What is measured on each piece.
+const OBSERVED: ObservableSet = ObservableSet::EXTREMES.union(ObservableSet::ENERGY_BALANCE);
 
 /// Time, in units of √(mL⁴/(EI)), below which contact that begins at the end of a piece counts as
 /// belonging to the next.
@@ -301,6 +304,7 @@ fn joined(seen: &Observables, periods: f64, next: &Observables, more: f64) -> Ob
         ],
         contact_fraction: (periods * seen.contact_fraction + more * next.contact_fraction)
             / (periods + more),
+        energy_balance: seen.energy_balance.followed_by(&next.energy_balance),
         periods: periods + more,
         ..*seen
     }

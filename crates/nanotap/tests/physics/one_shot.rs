@@ -259,12 +259,60 @@ fn laws_do_not_notice_the_cut() {
                 pieces: Pieces::new().of(&pulse, &knots, 1.0).unwrap(),
             };
             let found = one_shot(&case, &read, &SimulateOptions::default()).unwrap();
-            (found.strobe[0].clone(), found.contacts)
+            let balance = found.observables.energy_balance;
+            assert!(balance.residual.abs() < 1e-9, "{law:?}: {balance:?}");
+            (
+                found.strobe[0].clone(),
+                found.contacts,
+                balance.sample_damping,
+            )
         };
-        let ((a, first), (b, second)) = (state(7), state(31));
+        let ((a, first, lost), (b, second, same)) = (state(7), state(31));
+        assert!(
+            (lost - same).abs() < 1e-8 * lost.abs().max(1e-3),
+            "{law:?}: {lost} {same}"
+        );
         assert!(first > 0 && first == second, "{law:?}: {first} {second}");
         for (a, b) in a.iter().zip(&b) {
             assert!((a - b).abs() < 1e-8, "{law:?}: {a} {b}");
         }
     }
+}
+
+/// The energies of a run: of the work of the drive, lever and sample lose a part, and the rest is stored. A
+/// force that depends on the gap alone loses nothing; a damper in contact loses the integral of its power
+/// over the time series.
+#[test]
+fn energies_of_a_shot_balance() {
+    let found = run(&stated(LEVER), "pulse 1us times 40", 30);
+    let balance = found.observables.energy_balance;
+    assert!(found.contacts > 0 && balance.drive_work > 0.0);
+    assert!(balance.residual.abs() < 1e-9, "{balance:?}");
+    assert_eq!(balance.resolved(balance.sample_damping), 0.0, "{balance:?}");
+    let damped = Case::from(Cantilever {
+        alpha4: 0.0,
+        alpha6: 1.5,
+        alpha5: 0.05,
+        ..Cantilever::paper()
+    });
+    let found = run(&damped, "pulse 0.5 times 10", 6);
+    let read = StatedSignal::Text("pulse 0.5 times 10".to_owned())
+        .read(&damped, 6)
+        .unwrap();
+    let model = damped.model().unwrap();
+    let names = nanotap::observe::time_series::columns(&model);
+    let [gap, force] =
+        ["gap", "force"].map(|of| names.iter().position(|name| *name == of).unwrap());
+    let (mut rows, resolution) = (Vec::new(), 4000);
+    nanotap::study::one_shot::sample(&damped, &read, &found.start, resolution, &mut |row| {
+        rows.push([row[gap], row[force]]);
+    })
+    .unwrap();
+    // −∫F dV by the trapezoidal rule.
+    let lost: f64 = rows
+        .windows(2)
+        .map(|pair| -0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]))
+        .sum();
+    let own = found.observables.energy_balance.sample_damping;
+    assert!(own > 0.0 && (lost / own - 1.0).abs() < 1e-3, "{lost} {own}");
 }

@@ -272,7 +272,7 @@ follows! {
     the_limit_of_the_force: "force-limit.md", 6 commands, 29 numbers;
     the_thermal_noise: "noise.md", 3 commands, 13 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
-    the_signals_of_one_shot: "one-shot.md", 2 commands, 9 numbers;
+    the_signals_of_one_shot: "one-shot.md", 2 commands, 11 numbers;
     q_control: "q-control.md", 3 commands, 7 numbers;
     the_scan: "scan.md", 3 commands, 25 numbers;
     the_formulas: "formula.md", 13 commands, 25 numbers;

@@ -42,9 +42,6 @@ export function sentence({ decided, states, undecided, reference, steps, step_co
 /** A value, or 0 without its unit. */
 const shown = (of) => (!of ? "–" : of.value === 0 ? "0" : of.shown);
 
-/** The words of a field of the form, its hint, and its choices. */
-export const field = ({ name: of, words, hint, choices }) => ({ words: t("data.image.fields")[of] ?? words, hint: t("data.image.hints")[of] ?? hint, choices: choices?.map((choice) => t("data.image.choices")[choice] ?? choice) });
-
 function table(caption, heads, rows) {
   const head = make("thead", {}, make("tr", {}, ...heads.map((words) => make("th", { scope: "col", textContent: words }))));
   const body = make("tbody", {}, ...rows.map(([first, ...rest]) => make("tr", {}, make("th", { scope: "row", textContent: local(first) }), ...rest.map((text) => make("td", { textContent: local(text) })))));

@@ -9,26 +9,13 @@ import * as figure from "./figure.js";
 import { moves } from "./lever.js";
 import { part } from "./plot.js";
 import { picture } from "./pictures.js";
-import { local, t } from "./words.js";
+import { local, t, worded } from "./words.js";
 import { inField, parts, pointed } from "./entry.js";
 import { make } from "./element.js";
 import * as image from "./image.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = ["approach", "diagram", "branches", "resonance", "basin", "map", "plan", "levers", "image", "data"];
-/** What the studies show, until they are computed. */
-const HINTS = {
-  approach: "Amplitude, phase, energy and peak force against the distance, coming nearer and going away.",
-  diagram: "The largest deflections of the motions that runs lead to, against a parameter: where a motion doubles its period or becomes chaotic.",
-  branches: "Every motion followed against a parameter, stable or not: where motions begin, end and meet.",
-  resonance: "Amplitude and phase against the frequency, up and down: the resonance curve and its jumps.",
-  basin: "To which motion each initial deflection and velocity leads.",
-  map: "The kinds of motion, the peak force, or the number of motions over two parameters.",
-  image: "A line of an image under feedback: height, amplitude error, phase and peak force over a known surface.",
-  levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row chooses that lever.",
-  data: "A measured curve over that of the model, the fit of the model to it, and its force without a contact law. Drop an instrument’s file (JPK, Bruker, Asylum, Nanosurf …) or a CSV file on the page, or choose one; columns of a CSV file are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
-  plan: "Where every motion meets the conditions, over free amplitude and setpoint: the window for imaging.",
-};
 const MOST_DATA = 24e6;       // bytes of a measured file
 const LINE = 6000;            // milliseconds in which the tip goes along the line of an image
 const FIRST = 5;              // fields of a form that are shown at once, if it has more than one in addition
@@ -38,7 +25,6 @@ const TERMINAL = 60000;       // milliseconds of a study for which the page name
 const TRIAL = 30000;          // the same for an estimate from a trial, which may be too short
 const CALM = 500;             // milliseconds without a change before a study is tried
 const NO_TRIAL = ["data", "image"]; // forms whose study is not tried: their command needs a file
-const OTHER = "computed for other values – compute again";
 /** A tapping curve of the DMT example, with its noise: docs/cases/fit.md. */
 const EXAMPLE = { preset: "dmt", name: "dmt-tapping.csv", rows: "distance (nm),amplitude (nm),phase (deg)\n19.000,18.734,110.34\n17.875,18.388,67.00\n16.750,17.293,59.79\n15.625,16.188,54.08\n14.500,15.029,48.83\n13.375,13.921,44.17\n12.250,12.792,39.86\n11.125,11.691,35.75\n10.000,10.544,31.85\n" };
 const PLAIN = {};             // studies that the page knows from the registry only: name -> what they are about
@@ -67,7 +53,9 @@ const calibrates = () => kind === "calibrate" && state.tab === "data";
 const form = () => (state.tab === "data" && kind ? kind : state.tab);
 const asked = () => JSON.stringify([basis(), form(), state.study, state.tab === "data" && measured?.[0]]);
 const shape = () => asked() + JSON.stringify([forms[form()], state.tab in PLAIN && forms.usual[state.tab]]);
-const hint = () => HINTS[state.tab] ?? `${PLAIN[state.tab]}.`;
+/** What a study shows. */
+const about = (name) => t("studies.about")[name] ?? `${PLAIN[name]}.`;
+const hint = () => about(state.tab);
 
 /** The keys of the case that a figure does not depend on: those along its axes. Other keys must be as
  *  they stay along the axis, or the axis is another one. */
@@ -94,7 +82,7 @@ function mark() {
   for (const id of ["study-export", "tables"]) $(id).classList.toggle("stale", other);
   for (const button of document.querySelectorAll("[data-study-export]")) button.disabled = other;
   $("stale").hidden = !other;
-  $("stale").textContent = other ? state.tab === "data" ? t("studies.fitted") : OTHER : "";
+  $("stale").textContent = other ? state.tab === "data" ? t("studies.fitted") : t("studies.other") : "";
   // A link contains only figures of the same case.
   if (other && state.ran) { state.ran = ""; remember(false); }
   point();
@@ -139,7 +127,7 @@ async function take(...files) {
   if (files.some((one) => one.name.toLowerCase().endsWith(".toml"))) { openCase(files); return; }
   showData();
   if (state.tab !== "data") choose("data");
-  if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page reads at most ${MOST_DATA}, the terminal more`; return; }
+  if (file.size > MOST_DATA) { $("progress").textContent = t("studies.tooLarge", { name: file.name, size: file.size, most: MOST_DATA }); return; }
   open(file.name, { base64: await base64Of(file) });
 }
 
@@ -165,7 +153,7 @@ export function begin(motionChanged, studies, openFile, toData) {
   gone = motionChanged;
   openCase = openFile;
   showData = toData;
-  for (const { name, about, form } of studies) { PLAIN[name] = about; plain[name] = form; }
+  for (const study of studies) { PLAIN[study.name] = study.about; plain[study.name] = study.form; }
   addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
   addEventListener("drop", (event) => {
     if (!event.dataTransfer?.files.length) return;
@@ -174,8 +162,8 @@ export function begin(motionChanged, studies, openFile, toData) {
   });
   for (const name of [...TABS, ...Object.keys(PLAIN)]) {
     const tab = document.createElement("button");
-    Object.assign(tab, { type: "button", id: `tab-${name}`, title: HINTS[name] ?? `${PLAIN[name]}.` });
-    tab.append(picture(name), t("cards")[name] ?? name.replaceAll("-", " "));
+    Object.assign(tab, { type: "button", id: `tab-${name}` });
+    tab.append(picture(name), "");
     tab.setAttribute("role", "tab");
     tab.setAttribute("aria-controls", "study-panel");
     tab.addEventListener("click", () => choose(name));
@@ -198,7 +186,7 @@ export function begin(motionChanged, studies, openFile, toData) {
   });
   figure.alive($("study-figure"), {
     views,
-    tell: (place) => { $("hover").textContent = place ? `${figure.words(place)}${nearest(place) ? ": a motion is drawn here" : ""}` : ""; },
+    tell: (place) => { $("hover").textContent = place ? `${figure.words(place)}${nearest(place) ? t("studies.drawnMotion") : ""}` : ""; },
     go,
     zoom: (next) => { state.views.study = next; remember(true); },
     redrawn: point,
@@ -219,7 +207,11 @@ export function restore() {
   clearTimeout(timer);
   if (!(TABS.includes(state.tab) || state.tab in PLAIN)) state.tab = "approach";
   for (const tab of $("tabs").children) {
-    const chosen = tab.id === `tab-${state.tab}`;
+    const name = tab.id.slice("tab-".length);
+    const chosen = name === state.tab;
+    // In the language of now.
+    tab.title = about(name);
+    tab.lastChild.data = t("cards")[name] ?? name.replaceAll("-", " ");
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
     // Within the strip of cards alone: the page stays where it is.
@@ -366,15 +358,15 @@ function build() {
     else if (state.preset === EXAMPLE.preset) button(t("data.example"), () => open(EXAMPLE.name, EXAMPLE.rows), "example-data");
   }
   button(t("studies.stop"), () => stop("study"), "stop").hidden = !asking;
-  const pin = button(pinned ? "Unpin" : "Pin", () => {
+  const pin = button(t(pinned ? "studies.unpin" : "studies.pin"), () => {
     const before = pinned;
     pinned = pinned || !drawn ? null : shown;
-    pin.textContent = pinned ? "Unpin" : "Pin";
+    pin.textContent = t(pinned ? "studies.unpin" : "studies.pin");
     pin.setAttribute("aria-pressed", String(Boolean(pinned)));
     // Without its pinned curves the figure is drawn anew.
     if (before && drawn && isCurrent()) compute(state.tab === "approach" && state.ran !== "yes");
   }, "pin");
-  pin.title = "Keep the curves of this figure behind the next ones";
+  pin.title = t("studies.pinAbout");
   pin.setAttribute("aria-pressed", String(Boolean(pinned)));
   if (drawn) return;
   $("progress").textContent = hint();
@@ -386,15 +378,15 @@ function build() {
 function entry(field) {
   if (field.drawn) return hand(field, mark, again);
   const label = document.createElement("label");
-  const { words, hint, choices } = form() === "image-states" ? image.field(field) : field;
+  const { words, about, hint, choices } = worded(form(), field);
   label.textContent = `${words} `;
-  label.title = field.about ?? "";
+  label.title = about;
   const input = document.createElement(field.choices ? "select" : "input");
   (field.choices ?? []).forEach((choice, k) => input.add(new Option(choices[k], choice)));
   // What a study of the registry needs has a usual value for the case.
   const usual = state.tab in PLAIN ? forms.usual[state.tab]?.[field.name] : undefined;
   Object.assign(input, { name: field.name, value: inField(state.study[field.name] ?? usual ?? field.value) });
-  if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: hint ?? "" });
+  if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: hint });
   input.addEventListener("change", () => {
     state.study[field.name] = read(field, input.value);
     if (field.name === "surface") for (const box of $("study-form").querySelectorAll(".hand")) box.hidden = input.value !== "drawn";
@@ -405,14 +397,14 @@ function entry(field) {
     if (state.tab === "data" && measured) compute(false);
   });
   label.append(input);
-  if (field.slider) label.append(slide(field, input));
+  if (field.slider) label.append(slide(words, field.slider, input));
   return label;
 }
 
 /** A slider of a field, logarithmic around its usual value. */
-function slide({ words, slider: { from, to, usual, unit } }, input) {
+function slide(words, { from, to, usual, unit }, input) {
   const range = make("input", { type: "range", min: 0, max: 1000 });
-  range.setAttribute("aria-label", `${words}, slider`);
+  range.setAttribute("aria-label", t("studies.slider", { words }));
   const { number, unit: of } = parts(input.value) ?? {};
   range.value = 1000 * Math.log((of === unit ? number : usual) / from) / Math.log(to / from);
   range.addEventListener("input", () => { input.value = inField(`${Number((from * (to / from) ** (range.value / 1000)).toPrecision(3))}${unit ? ` ${unit}` : ""}`); });
@@ -501,7 +493,7 @@ async function compute(quick, more = {}) {
   stop("trial");
   const given = { ...options(), ...more, ...(state.tab === "data" && kind && { [kind]: "yes" }) };
   const data = state.tab === "data" ? { data: measured } : {};
-  $("progress").textContent = "computing …";
+  $("progress").textContent = t("busy");
   const own = { ...subject(null), clicks: null, set: { ...state.set } };
   const whole = caseText();
   wait(own);
@@ -536,7 +528,8 @@ async function compute(quick, more = {}) {
       shown = message.figure ?? null;
       found = message.found ?? null;
       if (message.has_images && !hasImages) { hasImages = true; build(); }
-      $("progress").textContent = message.image ? image.sentence(message.image) : local(message.words);
+      const words = message.words === PLAIN[state.tab] ? hint() : local(message.words);
+      $("progress").textContent = message.image ? image.sentence(message.image) : words;
       $("study-command").textContent = message.command;
       $("study-python").textContent = message.python;
       $("study-export").hidden = false;
@@ -547,12 +540,12 @@ async function compute(quick, more = {}) {
       if (message.figure) figure.put($("study-figure"), message.image ? image.inWords(message.figure) : message.figure);
       mark();
       scan();
-      if (quick) $("progress").textContent = `${local(message.words)}; “Compute” refines the curve and follows its branches`;
+      if (quick) $("progress").textContent = t("studies.refines", { words });
     });
     request = current("study");
     await sent;
   } catch (error) {
-    if (asking === own) $("progress").textContent = superseded(error) ? "stopped" : local(error.message);
+    if (asking === own) $("progress").textContent = superseded(error) ? t("studies.stopped") : local(error.message);
   }
   clearTimeout(slow);
   if (asking && asking !== own) return;

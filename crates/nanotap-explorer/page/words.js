@@ -177,6 +177,18 @@ const english = {
     rowLabel: "{name}: choose this state",
     surface: "surface",
   },
+  fields: {
+    hints: {},
+    choices: {},
+    of: {
+      "image-states": {
+        setpoint: { words: "Setpoint of the image", hint: "of the case" }, phase_offset: { words: "Phase at a lag of zero (°)", hint: "from the image" }, sense: { words: "The phase is a", choices: { "": "from the image" } }, direction: { words: "Lines of the" },
+        convert: { words: "Conversions", hint: "NAME=RULE" }, height: { words: "Channel of the height", hint: "by its name" }, amplitude: { words: "Channel of the amplitude", hint: "by its name" }, phase: { words: "Channel of the phase", hint: "by its name" },
+        amplitude_noise: { words: "Noise of the amplitude", hint: "from the image" }, phase_noise: { words: "Noise of the phase (°)", hint: "from the image" }, phase_tolerance: { words: "Error of the case's phases (°)" },
+        amplitude_error: { words: "Correct the error of the amplitude, too" }, confidence: { words: "Least probability" },
+      },
+    },
+  },
   cards: {
     approach: "Come near, draw back", diagram: "Period doubling", branches: "All motions", resonance: "Resonance", basin: "Which start leads where", map: "Map", plan: "Where you may work", levers: "Which lever", image: "Scan", data: "My data",
   },
@@ -193,12 +205,6 @@ const english = {
       manySteps: "The state changes {count} times: these steps of the height are the lever's, not the surface's ({height} at the most).",
       reference: "The corrected heights are those of the {name} state.",
       below: "below 1 %",
-      fields: {
-        setpoint: "Setpoint of the image", phase_offset: "Phase at a lag of zero (°)", sense: "The phase is a", direction: "Lines of the", convert: "Conversions", height: "Channel of the height", amplitude: "Channel of the amplitude",
-        phase: "Channel of the phase", amplitude_noise: "Noise of the amplitude", phase_noise: "Noise of the phase (°)", phase_tolerance: "Error of the case's phases (°)", amplitude_error: "Correct the error of the amplitude, too", confidence: "Least probability",
-      },
-      hints: { setpoint: "of the case", phase_offset: "from the image", convert: "NAME=RULE", height: "by its name", amplitude: "by its name", phase: "by its name", amplitude_noise: "from the image", phase_noise: "from the image" },
-      choices: { "": "from the image", lag: "lag", lead: "lead", trace: "trace", retrace: "retrace", yes: "yes", no: "no" },
       statesHead: "States of the lever at the setpoint",
       stepsHead: "Steps of the height that are the lever's",
       stepsFirst: "Steps of the height that are the lever's, {shown} of {count}",
@@ -281,6 +287,25 @@ const english = {
     fitted: "computed for other values",
     long: "This will take {time} here.", terminal: "To compute it at the terminal, on all processors, save the case and run:",
     minute: "over a minute", minutes: "roughly {count} min", hours: "roughly {count} h",
+    about: {
+      approach: "Amplitude, phase, energy and peak force against the distance, coming nearer and going away.",
+      diagram: "The largest deflections of the motions that runs lead to, against a parameter: where a motion doubles its period or becomes chaotic.",
+      branches: "Every motion followed against a parameter, stable or not: where motions begin, end and meet.",
+      resonance: "Amplitude and phase against the frequency, up and down: the resonance curve and its jumps.",
+      basin: "To which motion each initial deflection and velocity leads.",
+      map: "The kinds of motion, the peak force, or the number of motions over two parameters.",
+      image: "A line of an image under feedback: height, amplitude error, phase and peak force over a known surface.",
+      levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row chooses that lever.",
+      data: "A measured curve over that of the model, the fit of the model to it, and its force without a contact law. Drop an instrument’s file (JPK, Bruker, Asylum, Nanosurf …) or a CSV file on the page, or choose one; columns of a CSV file are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
+      plan: "Where every motion meets the conditions, over free amplitude and setpoint: the window for imaging.",
+    },
+    other: "computed for other values – compute again",
+    refines: "{words}; “Compute” refines the curve and follows its branches",
+    stopped: "stopped",
+    pin: "Pin", unpin: "Unpin", pinAbout: "Keep the curves of this figure behind the next ones",
+    slider: "{words}, slider",
+    tooLarge: "{name} has {size} bytes; the page reads at most {most}, the terminal more",
+    drawnMotion: ": a motion is drawn here",
     follow: "keep the state while I turn a knob, as an instrument does",
   },
   zero: "0 throughout, not drawn: {names}",
@@ -461,6 +486,14 @@ export function t(path, values = {}) {
   const words = find(chosen, path) ?? find(english, path);
   if (typeof words !== "string") return words ?? path;
   return words.replace(/\{(\w+)\}/g, (whole, name) => (VERBATIM.includes(name) ? values[name] : name in values ? local(values[name] ?? whole) : whole));
+}
+
+/** A field of a form in the page's words: its label, the sentence about it, its placeholder and the texts of its
+ *  choices. What the page has no words for has those of the program's tables. */
+export function worded(form, { name, words, about = "", hint = "", choices = [] }) {
+  const { of, hints, choices: texts } = chosen.fields;
+  const own = of[form]?.[name] ?? {};
+  return { words: own.words ?? words, about: own.about ?? about, hint: own.hint ?? hints[hint] ?? hint, choices: choices.map((choice) => own.choices?.[choice] ?? texts[choice] ?? choice) };
 }
 
 /** Puts the words into the page: an element names its own by `data-t`, its label by `data-t-label`. */

@@ -53,6 +53,7 @@ const calibrates = () => kind === "calibrate" && state.tab === "data";
 const form = () => (state.tab === "data" && kind ? kind : state.tab);
 const asked = () => JSON.stringify([basis(), form(), state.study, state.tab === "data" && measured?.[0]]);
 const shape = () => asked() + JSON.stringify([forms[form()], state.tab in PLAIN && forms.usual[state.tab]]);
+const named = (tab) => tab.id.slice("tab-".length);
 /** What a study shows. */
 const about = (name) => t("studies.about")[name] ?? `${PLAIN[name]}.`;
 const hint = () => about(state.tab);
@@ -207,11 +208,13 @@ export function restore() {
   clearTimeout(timer);
   if (!(TABS.includes(state.tab) || state.tab in PLAIN)) state.tab = "approach";
   for (const tab of $("tabs").children) {
-    const name = tab.id.slice("tab-".length);
-    const chosen = name === state.tab;
+    const name = named(tab);
     // In the language of now.
     tab.title = about(name);
     tab.lastChild.data = t("cards")[name] ?? name.replaceAll("-", " ");
+  }
+  for (const tab of $("tabs").children) {
+    const chosen = named(tab) === state.tab;
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
     // Within the strip of cards alone: the page stays where it is.
@@ -226,9 +229,9 @@ export function restore() {
 export function fill(next) {
   motion = next;
   forms = { ...plain, ...next.forms };
-  // Only a lever makes images, and is compared with others.
-  for (const name of ["image", "levers"]) $(`tab-${name}`).hidden = !forms[name].length;
-  if (!(state.tab in PLAIN || forms[state.tab].length)) { state.tab = "approach"; restore(); }
+  // What a case cannot do has no fields: only a lever makes images, is compared with others, and has a drive of one shot.
+  for (const tab of $("tabs").children) tab.hidden = !forms[named(tab)].length;
+  if (!forms[state.tab].length) { state.tab = "approach"; restore(); }
   const now = shape();
   if (now !== filled) {
     filled = now;
@@ -286,7 +289,7 @@ function long(time, command) {
 /** Whether a field is of one number, with or without a unit. */
 const isNumber = ({ name, hint, choices }) => !choices && !/[,=:]|STATE/.test(hint ?? "") && !["start", "state", "profile"].includes(name);
 /** The text of a field as the program reads it. */
-const read = (field, text) => (isNumber(field) ? pointed(text) : text);
+const read = (field, text) => (field.name === "drive_signal" ? text.split(" ").map(pointed).join(" ") : isNumber(field) ? pointed(text) : text);
 
 const options = () => Object.fromEntries([...new FormData($("study-form"))].map(([name, text]) => [name, read(forms[form()].find((field) => field.name === name) ?? {}, text)]));
 

@@ -202,6 +202,7 @@ export const german = {
       image: "Eine Zeile eines Bildes unter Regelung: Höhe, Fehler der Amplitude, Phase und Maximalkraft über einer bekannten Oberfläche.",
       levers: "Cantilever des Katalogs auf dieser Probe, bei der freien Amplitude und dem Sollwert: Ein Klick auf eine Zeile wählt diesen Cantilever.",
       data: "Eine gemessene Kurve über der des Modells, die Anpassung des Modells an sie, und ihre Kraft ohne Kontaktgesetz. Legen Sie eine Datei Ihres Geräts (JPK, Bruker, Asylum, Nanosurf …) oder eine CSV-Datei auf der Seite ab, oder wählen Sie eine; die Spalten einer CSV-Datei heißen wie in „distance (nm)“, „amplitude (nm)“, „phase (deg)“. Die Datei bleibt auf dieser Seite.",
+      simulate: "Ein Signal statt der periodischen Anregung: wie der Cantilever ihm folgt, wo er aufsetzt und wie er ausschwingt. Wie in „pulse 1us times 400“, „chirp 300kHz 350kHz 3ms“, „sinc 1MHz 40us“.",
       plan: "Wo jede Bewegung die Bedingungen erfüllt, über freier Amplitude und Sollwert: das Fenster zum Abbilden.",
       modes: "Formen und Frequenzen der Moden, im freien Flug und im Kontakt.",
       fm: "Frequenzverschiebung und Anregung über dem Abstand zur Probe, bei gehaltener Amplitude und Phase.",
@@ -452,6 +453,11 @@ export const german = {
       levers: { setpoint: field("Sollwert"), tip: field("Spitze"), ...CONDITIONS },
       basin: twice({ entry: field("Koordinate"), from: RANGE.from, to: RANGE.to }, ["x", "y"]),
       image: { surface: field("Oberfläche"), height: field("Höhe"), size: field("Länge der Zeile"), setpoint: field("Sollwert"), rate: field("Zeilenrate"), gain: field("Integrale Verstärkung (1/s)") },
+      simulate: {
+        drive_signal: field("Signal, das einmal läuft", "Ein Signal statt der periodischen Anregung: „pulse 5us“, „chirp 60kHz 90kHz 5ms“, „sinc 200kHz 1ms times 40“; seine 1 ist die Anregung des Falls"),
+        periods: field("Perioden danach", "Anregungsperioden, über die der Cantilever nach dem Ende des Signals verfolgt wird"),
+        state: field("Anfangszustand", `Anfangszustand: ${STATE}; sonst: die Ruhe`),
+      },
       modes: { points: field("Punkte", "Punkte entlang des Balkens in der Tabelle der Modenformen") },
       fm: {
         from: field("Erster Abstand", "Erster Abstand, in Einheiten des Falls („30 nm“) oder als alpha5; sonst: 1,25-mal die freie Amplitude vor der Probe"),
@@ -606,7 +612,7 @@ export const german = {
   },
   cards: {
     approach: "Annähern, zurückziehen", diagram: "Periodenverdopplung", branches: "Alle Bewegungen", resonance: "Resonanz", basin: "Welcher Start führt wohin", map: "Karte", plan: "Wo man arbeiten kann", levers: "Welcher Cantilever", image: "Scan", data: "Meine Daten",
-    modes: "Moden", fm: "Frequenzmodulation", sweep: "Parameter durchlaufen", window: "Arbeitsfenster", lyapunov: "Lyapunov-Exponenten", convergence: "Wie viele Moden", "contact-laws": "Kontaktgesetze", noise: "Thermisches Rauschen", bimodal: "Bimodaler Betrieb", "force-curve": "Kraftkurve",
+    simulate: "Puls, Chirp, Sinc", modes: "Moden", fm: "Frequenzmodulation", sweep: "Parameter durchlaufen", window: "Arbeitsfenster", lyapunov: "Lyapunov-Exponenten", convergence: "Wie viele Moden", "contact-laws": "Kontaktgesetze", noise: "Thermisches Rauschen", bimodal: "Bimodaler Betrieb", "force-curve": "Kraftkurve",
   },
   data: {
     image: {

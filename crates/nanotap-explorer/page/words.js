@@ -181,6 +181,10 @@ const english = {
     hints: {},
     choices: {},
     of: {
+      simulate: {
+        drive_signal: { words: "signal" }, state: { words: "initial state" },
+        periods: { words: "drive periods after it", about: "Drive periods for which the lever is followed after the end of the signal" },
+      },
       "image-states": {
         setpoint: { words: "Setpoint of the image", hint: "of the case" }, phase_offset: { words: "Phase at a lag of zero (°)", hint: "from the image" }, sense: { words: "The phase is a", choices: { "": "from the image" } }, direction: { words: "Lines of the" },
         convert: { words: "Conversions", hint: "NAME=RULE" }, height: { words: "Channel of the height", hint: "by its name" }, amplitude: { words: "Channel of the amplitude", hint: "by its name" }, phase: { words: "Channel of the phase", hint: "by its name" },
@@ -190,7 +194,7 @@ const english = {
     },
   },
   cards: {
-    approach: "Come near, draw back", diagram: "Period doubling", branches: "All motions", resonance: "Resonance", basin: "Which start leads where", map: "Map", plan: "Where you may work", levers: "Which lever", image: "Scan", data: "My data",
+    approach: "Come near, draw back", diagram: "Period doubling", branches: "All motions", resonance: "Resonance", basin: "Which start leads where", map: "Map", plan: "Where you may work", levers: "Which lever", image: "Scan", data: "My data", simulate: "A pulse, a chirp, a sinc",
   },
   data: {
     image: {
@@ -297,6 +301,7 @@ const english = {
       image: "A line of an image under feedback: height, amplitude error, phase and peak force over a known surface.",
       levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row chooses that lever.",
       data: "A measured curve over that of the model, the fit of the model to it, and its force without a contact law. Drop an instrument’s file (JPK, Bruker, Asylum, Nanosurf …) or a CSV file on the page, or choose one; columns of a CSV file are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
+      simulate: "One signal in place of the periodic drive: how the lever follows it, where it touches, and how it rings down. As in “pulse 1us times 400”, “chirp 300kHz 350kHz 3ms”, “sinc 1MHz 40us”.",
       plan: "Where every motion meets the conditions, over free amplitude and setpoint: the window for imaging.",
     },
     other: "computed for other values – compute again",

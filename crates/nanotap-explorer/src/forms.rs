@@ -9,7 +9,8 @@ use nanotap::study::image_states::ImageStatesOptions;
 use nanotap::study::lever::{time_constant, usual_gain};
 use nanotap::study::registry::{STUDIES, StudyEntry, study};
 use nanotap::study::request::{Property, properties, schema};
-use nanotap::study::start_box::default_box;
+use nanotap::study::simulate::SimulateStudy;
+use nanotap::study::{Study as _, start_box::default_box};
 use schemars::Schema;
 use serde_json::{Value, json};
 
@@ -27,8 +28,7 @@ const NO: &str = "no";
 /// The choice of the tip of the case for other levers.
 pub(crate) const OWN_TIP: &str = "of the case";
 /// Studies with a tab, or a place on the page, made for them.
-const PLACED: [&str; 11] = [
-    "simulate",
+const PLACED: [&str; 10] = [
     "orbit",
     "attractors",
     "branch",
@@ -60,7 +60,27 @@ pub(crate) fn plain(entry: &StudyEntry) -> Value {
 
 /// The form of a study's options.
 fn of_options(entry: &StudyEntry) -> Vec<Value> {
-    of_schema(&(entry.request)())
+    let mut fields = of_schema(&(entry.request)());
+    if entry.name == SimulateStudy::NAME {
+        fields.retain(|field| OF_ONE_SHOT.iter().any(|name| field["name"] == *name));
+        sort_first(&mut fields, &OF_ONE_SHOT);
+    }
+    fields
+}
+
+/// The field without which a simulation is no study of the page: its motions are there already.
+pub(crate) const SIGNAL: &str = "drive_signal";
+/// Options of a simulation under a signal of one shot.
+const OF_ONE_SHOT: [&str; 3] = [SIGNAL, "periods", "state"];
+
+/// A pulse that reaches the sample: it moves the tip by about twice the free amplitude.
+fn pulse(case: &Case) -> String {
+    let Some(view) = case.physical() else {
+        return "pulse 0.3 times 10".to_owned();
+    };
+    let width = Kind::Time.format_digits(0.3 / case.get(Key::DriveFrequency), 1);
+    let times = Kind::Number.format_digits(view.lever.quality_factor.max(1.0), 2);
+    format!("pulse {width} times {times}")
 }
 
 /// The form of options with this schema.
@@ -274,11 +294,12 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
     let usual = json!({
         "sweep": { "over": range(&one, POINTS[0]) },
         "window": { "over": across_both },
+        (SimulateStudy::NAME): { (SIGNAL): pulse(case) },
     });
     let data = data(case);
     let image = image(case, base);
     let slice = [entry("x", 0), entry("y", velocity)].concat();
-    json!({
+    let mut forms = json!({
         "usual": usual,
         "diagram": parameter("", frequency, band),
         "branches": parameter("", frequency, band),
@@ -295,7 +316,12 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         "image-states": image_states(),
         "image": image,
         "basin": slice,
-    })
+    });
+    if case.cantilever().is_none() {
+        // An oscillator has no drive of one shot.
+        forms[SimulateStudy::NAME] = json!([]);
+    }
+    forms
 }
 
 /// The fields of the comparison of levers.

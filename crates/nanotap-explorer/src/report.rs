@@ -14,13 +14,23 @@ const MAX_COLUMNS: usize = 12;
 /// Numbers of a list that are shown.
 const MAX_NUMBERS: usize = 8;
 
-/// The tables of a document: its values, then one for each list of objects.
+/// The tables of a document: its values, then one for each list of objects. What the document has in
+/// SI, too, is shown in SI alone.
 pub(crate) fn tables(document: &Value, schema: &Value) -> Vec<Value> {
     let mut values = Vec::new();
     let mut lists = Vec::new();
+    let report = alternative(document, schema);
+    let si = Field::of(schema, report, "physical").node;
+    let in_si = document["physical"].as_object().into_iter().flatten();
+    let in_si: Vec<String> = in_si
+        .map(|(name, _)| Field::of(schema, si, name).words)
+        .collect();
     let fields = document.as_object().into_iter().flatten();
     for (name, value) in fields.filter(|(name, _)| !["case", "version"].contains(&name.as_str())) {
-        let field = Field::of(schema, schema, name);
+        let field = Field::of(schema, report, name);
+        if !field.words.is_empty() && in_si.contains(&field.words) {
+            continue;
+        }
         match value {
             Value::Array(rows) if rows.first().is_some_and(Value::is_object) => {
                 lists.push(list(name, rows, &field, schema));
@@ -38,6 +48,19 @@ pub(crate) fn tables(document: &Value, schema: &Value) -> Vec<Value> {
         lists.insert(0, table("", &[("", ""), ("", "")], &values));
     }
     lists
+}
+
+/// The alternative of a report that describes most of a document's fields; the report itself if it has
+/// none.
+fn alternative<'a>(document: &Value, schema: &'a Value) -> &'a Value {
+    let names = || document.as_object().into_iter().flatten();
+    let described = |report: &&Value| {
+        let known = |name: &String| report["properties"].get(name).is_some();
+        names().filter(|(name, _)| known(name)).count()
+    };
+    let all = schema["anyOf"].as_array().into_iter().flatten();
+    let all = all.map(|one| resolved(schema, one));
+    all.max_by_key(described).unwrap_or(schema)
 }
 
 /// A table as the page reads it: heads with their meanings, and rows of cells.

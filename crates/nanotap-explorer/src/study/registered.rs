@@ -2,7 +2,9 @@
 
 use nanotap::Error;
 use nanotap::control::Control;
+use nanotap::study::Study as _;
 use nanotap::study::registry::{DatasetPlan, StudyEntry, study as study_named};
+use nanotap::study::simulate::SimulateStudy;
 use nanotap_figures::Figure;
 use serde_json::Value;
 
@@ -25,6 +27,9 @@ impl Studied<'_> {
         })?;
         let case = self.request.case.any_distance(self.app)?;
         model_of(&case)?;
+        if entry.name == SimulateStudy::NAME {
+            self.field(forms::SIGNAL)?;
+        }
         let options = self.options(entry);
         let request = Value::Object(options.clone());
         self.begins(entry.name, &options);

@@ -589,6 +589,8 @@ impl Study for SimulateStudy {
     type Options = SimulateOptions;
     type Report = SimulateReport;
 
+    const COUNTED: &'static str = "pieces of the signal";
+
     /// The grid of a run with fixed steps. The exact motion is a function of time: `--out` and Python
     /// sample it as finely as asked.
     fn frames<'a>(case: &Case, report: &'a SimulateReport) -> Vec<Frame<'a>> {
@@ -610,14 +612,14 @@ impl Study for SimulateStudy {
     fn compute(
         case: &Case,
         options: &SimulateOptions,
-        _: &Control<'_>,
+        control: &Control<'_>,
     ) -> Result<SimulateReport, Error> {
         let options = &SimulateOptions {
             state: case.state_of(options.state.as_ref())?,
             ..options.clone()
         };
         if let Some(read) = options.signal(case)? {
-            let motion = one_shot(case, &read, options)?;
+            let motion = one_shot(case, &read, options, control)?;
             let resolved = case.physical();
             let physical = resolved.map(|of| PhysicalMotion::alone(&motion.observables, None, of));
             return Ok(SimulateReport::OneShot(Box::new(InSi { motion, physical })));

@@ -13,6 +13,7 @@ use super::drive_signal::ReadSignal;
 use super::{Classification, SimulateOptions, is_none, starting_state};
 use crate::figure::motion::contact_intervals;
 use nanotap_case::Case;
+use nanotap_dynamics::Control;
 use nanotap_error::Error;
 use nanotap_flow::Output;
 use nanotap_model::drive_signal::DriveSignal;
@@ -34,7 +35,7 @@ pub struct OneShot {
     pub signal_periods: f64,
     /// Length of the run in periods of the case's drive.
     pub periods: f64,
-    /// Always a transient.
+    /// Kind of motion: always a transient.
     pub classification: Classification,
     /// What was followed, in words.
     pub evidence: String,
@@ -129,11 +130,13 @@ struct PieceRun<'a> {
     piece: &'a DriveSignal,
 }
 
-/// Runs a case piece by piece from `state`, and shows each. Returns the last state.
+/// Runs a case piece by piece from `state`, and shows each; the progress counts them. Returns the last
+/// state.
 fn follow(
     case: &Case,
     read: &ReadSignal,
     mut state: Vec<f64>,
+    control: &Control<'_>,
     mut each: impl FnMut(&PieceRun<'_>),
 ) -> Result<Vec<f64>, Error> {
     let kept = RecordOptions {
@@ -143,7 +146,10 @@ fn follow(
         each_period: false,
     };
     let (mut before, mut touching) = ([0.0; 2], None);
-    for piece in &read.pieces {
+    for (done, piece) in read.pieces.iter().enumerate() {
+        if let Some(progress) = control.progress {
+            progress(done, read.pieces.len());
+        }
         let Some(driven) = case.under_signal(&Arc::new(piece.clone())) else {
             break;
         };
@@ -185,11 +191,12 @@ fn within_rounding(first: Option<&MotionPiece>) -> bool {
 /// Runs a case under a signal.
 ///
 /// # Errors
-/// When the state does not fit or the flow fails.
+/// When the state does not fit, the flow fails, or the case's work was cancelled.
 pub fn one_shot(
     case: &Case,
     read: &ReadSignal,
     options: &SimulateOptions,
+    control: &Control<'_>,
 ) -> Result<OneShot, Error> {
     let model = case.model()?;
     let start = match &options.state {
@@ -200,7 +207,7 @@ pub fn one_shot(
     let (mut seen, mut events, mut curves) = (None, Vec::new(), Curves::default());
     let mut contacts: Vec<f64> = Vec::new();
     let step = window / (POINTS.0 * window).min(POINTS.1).ceil();
-    let last = follow(case, read, start.clone(), |run| {
+    let last = follow(case, read, start.clone(), control, |run| {
         let observables = &run.recorded.observables;
         seen = Some(seen.map_or(*observables, |seen| {
             joined(&seen, run.before[0], observables, run.piece.length)
@@ -262,7 +269,7 @@ pub fn sample(
         .into());
     }
     let window = read.window();
-    follow(case, read, start.to_vec(), |run| {
+    follow(case, read, start.to_vec(), &Control::default(), |run| {
         let scale = run.model.period() / run.piece.length;
         let tip_rate = run.model.tip_rate();
         // The very end belongs to the series.

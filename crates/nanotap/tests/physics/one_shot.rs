@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nanotap::case::Case;
+use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::drive_form::Actuation;
@@ -25,7 +26,7 @@ fn run(case: &Case, signal: &str, periods: usize) -> OneShot {
         ..SimulateOptions::default()
     };
     let read = options.signal(case).unwrap().unwrap();
-    one_shot(case, &read, &options).unwrap()
+    one_shot(case, &read, &options, &Control::default()).unwrap()
 }
 
 /// Three modes over DMT.
@@ -70,7 +71,13 @@ fn a_sine_is_the_periodic_drive() {
             length: 8.0,
             pieces: Pieces::new().of(&sine, &knots, 1.0).unwrap(),
         };
-        let found = one_shot(&case, &read, &SimulateOptions::default()).unwrap();
+        let found = one_shot(
+            &case,
+            &read,
+            &SimulateOptions::default(),
+            &Control::default(),
+        )
+        .unwrap();
         let model = case.model().unwrap();
         let mut state = model.rest();
         ModelMap::new(&model).advance_by(&mut state, 8).unwrap();
@@ -209,7 +216,7 @@ fn a_table_of_a_pulse_is_the_pulse() {
         };
         let read = options.signal(&case).unwrap().unwrap();
         assert!((read.length - end * frequency).abs() < 1e-9);
-        let found = one_shot(&case, &read, &options).unwrap();
+        let found = one_shot(&case, &read, &options, &Control::default()).unwrap();
         let off = (found.observables.tip_max / pulse.observables.tip_max - 1.0).abs();
         assert!(off < 0.1 * last, "{rows}: {off} after {last}");
         last = off;
@@ -258,7 +265,13 @@ fn laws_do_not_notice_the_cut() {
                 length: 6.0,
                 pieces: Pieces::new().of(&pulse, &knots, 1.0).unwrap(),
             };
-            let found = one_shot(&case, &read, &SimulateOptions::default()).unwrap();
+            let found = one_shot(
+                &case,
+                &read,
+                &SimulateOptions::default(),
+                &Control::default(),
+            )
+            .unwrap();
             let balance = found.observables.energy_balance;
             assert!(balance.residual.abs() < 1e-9, "{law:?}: {balance:?}");
             (

@@ -16,10 +16,10 @@ COPIED = "pre, .line, #link, script, style"
 VIEWS = {
     "states": (
         "",
-        "document.body.dataset.search === 'done' && document.querySelector('#margin').textContent.includes('m/s')",
+        "document.body.dataset.search === 'done' && document.querySelector('#margin')?.textContent.includes('m/s')",
     ),
     "plan": ("", "document.querySelector('#view-plan').dataset.plan === 'done'"),
-    "scan": ("", "document.querySelector('#strips').dataset.line === 'exact'"),
+    "scan": ("", "document.querySelector('#strips')?.dataset.line === 'exact'"),
     "studies": (
         "&tab=events&ran=yes",
         "document.querySelector('#tables td') && document.querySelector('#bound').textContent.includes('%')",

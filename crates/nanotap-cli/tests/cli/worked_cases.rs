@@ -233,7 +233,7 @@ fn the_gallery() {
             assert!(folder.path().join(figure).exists(), "{command}");
         }
     }
-    assert_eq!(count, 31);
+    assert_eq!(count, 32);
 }
 
 /// One test per document, so that they run in parallel.

@@ -1,5 +1,6 @@
 //! The forms of the studies: their fields and initial values.
 
+use nanotap::case::physical::Physical;
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key, Value as Stated};
 use nanotap::model::Model;
@@ -7,6 +8,7 @@ use nanotap::observe::time_series::state_names;
 use nanotap::study::calibrate::CalibrateOptions;
 use nanotap::study::image_states::ImageStatesOptions;
 use nanotap::study::lever::{time_constant, usual_gain};
+use nanotap::study::modes::ModeTable;
 use nanotap::study::registry::{STUDIES, StudyEntry, study};
 use nanotap::study::request::{Property, properties, schema};
 use nanotap::study::simulate::SimulateStudy;
@@ -73,13 +75,21 @@ pub(crate) const SIGNAL: &str = "drive_signal";
 /// Options of a simulation under a signal of one shot.
 const OF_ONE_SHOT: [&str; 3] = [SIGNAL, "periods", "state"];
 
+/// Quality factor with which the free lever rings down: that of the closed loop under Q control.
+pub(crate) fn quality_factor(view: &Physical) -> f64 {
+    let case = &view.cantilever;
+    let of_loop = || ModeTable::new(case).ok()?.quality?.first().copied();
+    let of_loop = case.has_q_control().then(of_loop).flatten();
+    of_loop.unwrap_or(view.lever.quality_factor)
+}
+
 /// A pulse that reaches the sample: it moves the tip by about twice the free amplitude.
 fn pulse(case: &Case) -> String {
     let Some(view) = case.physical() else {
         return "pulse 0.3 times 10".to_owned();
     };
     let width = Kind::Time.format_digits(0.3 / case.get(Key::DriveFrequency), 1);
-    let times = Kind::Number.format_digits(view.lever.quality_factor.max(1.0), 2);
+    let times = Kind::Number.format_digits(quality_factor(view).max(1.0), 2);
     format!("pulse {width} times {times}")
 }
 
@@ -243,9 +253,9 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
     };
     let velocity = (names.len() - model.memory) / 2;
     // A lever with high Q responds in a narrow band.
-    let band = case.physical().map_or(0.25, |view| {
-        (4.0 / view.lever.quality_factor).clamp(1e-3, 0.25)
-    });
+    let band = case
+        .physical()
+        .map_or(0.25, |view| (4.0 / quality_factor(view)).clamp(1e-3, 0.25));
     let shows: Vec<&str> = Shows::ALL.iter().map(|shows| shows.words()).collect();
     let shown = json!({ "name": "show", "words": "show", "choices": shows, "value": shows[0] });
     let plane = [
@@ -380,7 +390,7 @@ fn image(case: &Case, base: &Case) -> Vec<Value> {
     let own = case.scan().is_some();
     let frequency = base.get(Key::DriveFrequency);
     // Half the rate at which the lever's amplitude follows.
-    let gain = usual_gain(time_constant(view.lever.quality_factor, frequency));
+    let gain = usual_gain(time_constant(quality_factor(view), frequency));
     let surfaces = &SURFACES[usize::from(!own)..];
     let field = |name: &str, words: &str, value: String| {
         let value = if own { String::new() } else { value };

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use crate::Explorer;
 use crate::api_error::ApiError;
+use crate::forms::quality_factor;
 use crate::motion_request::Start;
 use crate::preset::CaseSpec;
 
@@ -89,7 +90,7 @@ pub(crate) fn margins(
     let held = held.transpose()?.map(|held| held.cancelled_by(control));
     let setpoint = |held: &Case| held.physical().and_then(|view| view.held);
     let held = held.filter(|held| !matches!(setpoint(held), None | Some(Held::Shift(_))));
-    let detuned = (WIDTHS / view.lever.quality_factor).min(DETUNED);
+    let detuned = (WIDTHS / quality_factor(view)).min(DETUNED);
     let ranges = [
         (Key::DriveFrequency, [1.0 - detuned, 1.0 + detuned]),
         (Key::DriveFreeAmplitude, AMPLITUDES),

@@ -21,6 +21,7 @@ use serde_json::{Value, json};
 use super::plan::PLAN_STARTS;
 use super::{Stage, Studied, dataset, object};
 use crate::api_error::ApiError;
+use crate::forms::quality_factor;
 
 /// Numbers of free amplitudes and of setpoints: near the case's own point, then over the whole range. The
 /// study follows an approach at each of up to 16 free amplitudes; of more, it leaves some out, and finds
@@ -199,7 +200,7 @@ impl Studied<'_> {
         let scan = case.scan().cloned().unwrap_or_default();
         let options: ScanOptions = read(Value::Object(scan))?;
         let [gain, slew] = options.feedback_limits()?;
-        let usual = usual_gain(time_constant(view.lever.quality_factor, view.lever.f0));
+        let usual = usual_gain(time_constant(quality_factor(view), view.lever.f0));
         Ok(Wishes {
             force,
             kind,
@@ -259,7 +260,7 @@ impl Studied<'_> {
         };
         let case = spec.any_distance(self.app)?;
         let view = physical(&case)?;
-        let constant = time_constant(view.lever.quality_factor, view.lever.f0);
+        let constant = time_constant(quality_factor(view), view.lever.f0);
         let error = point.free * (1.0 - point.setpoint);
         let times = PointTimes::new(constant, wishes.step, wishes.gain.0, error, wishes.slew);
         let (longest, limit) = times.longest();

@@ -2,7 +2,8 @@
 //!
 //! The lever is followed from far to the sample's own position and back. Its motions where the approach
 //! ends are sampled from several initial states, too, and from motions with the amplitude of the setpoint
-//! and several phases, at distances of about this amplitude. Each branch on the way, and each to which a
+//! and several phases, at distances of about this amplitude; there the orbits are closed, too, that averaging
+//! knows, to however few starts they may be a limit. Each branch on the way, and each to which a
 //! start leads, is continued round its folds, and every orbit on it that is at the setpoint is
 //! closed by Newton. A feedback loop holds those that are stable and on which the held quantity
 //! changes with the distance as it does on the approach.
@@ -19,6 +20,7 @@ use nanotap_error::Error;
 use nanotap_model::Model;
 use nanotap_model::model_map::ModelMap;
 use nanotap_study::FreeMotion;
+use nanotap_study::averaged_orbits::averaged_orbits;
 use nanotap_study::start_box::default_starts;
 
 use super::{
@@ -172,7 +174,7 @@ const fn place_gap(place: &Place) -> f64 {
 
 /// Distances at which motions with the amplitude of the setpoint are started, over that amplitude: a stiff
 /// sample lets the tip tap where both are the same, a soft one or an attraction lets it come nearer.
-const DISTANCES: [f64; 2] = [1.0, 0.9];
+const DISTANCES: [f64; 3] = [1.0, 0.9, 0.8];
 /// Phase lags behind the drive of these motions, degrees: from strong repulsion to strong attraction.
 const LAGS: [f64; 5] = [30.0, 60.0, 90.0, 120.0, 150.0];
 
@@ -206,7 +208,7 @@ impl Expected {
             .collect()
     }
 
-    /// Continues the branches to which these motions lead at a distance.
+    /// Continues the branches to which these motions lead at a distance, and those that averaging knows.
     fn follow(
         &self,
         sweep: &mut DistanceSweep<'_>,
@@ -217,10 +219,14 @@ impl Expected {
         let model = sweep.model(gap)?;
         // What one of these few starts does not decide is left to the others.
         let found = followed(&model, &self.starts(&model), options, control);
-        for attractor in found.attractors {
-            if let AttractorKind::Periodic(orbit) = attractor.kind {
-                sweep.on(gap, orbit);
-            }
+        let attractors = found.attractors.into_iter();
+        let orbits = attractors.filter_map(|attractor| match attractor.kind {
+            AttractorKind::Periodic(orbit) => Some(orbit),
+            _ => None,
+        });
+        let averaged = averaged_orbits(&model).into_iter();
+        for orbit in orbits.chain(averaged.filter(PeriodicOrbit::is_stable)) {
+            sweep.on(gap, orbit);
         }
         Ok(())
     }

@@ -234,7 +234,7 @@ def test_a_slider_is_dragged_for_a_minute(
           new MutationObserver(() => {
             const row = document.querySelector('#rows tbody tr');
             if (row && !row.classList.contains('approximate')) window.exact_.add(row.querySelector('td.distance').dataset.value);
-          }).observe(document.querySelector('#rows'), { childList: true, subtree: true });
+          }).observe(document.querySelector('#rows'), { childList: true, subtree: true, attributes: true, attributeFilter: ['class'] });
         }"""
     )
     client = page.context.new_cdp_session(page)
@@ -284,7 +284,7 @@ def test_a_slider_is_dragged_for_a_minute(
     # Smooth, exact on the way, without complaints, and without growth.
     assert frames / took > 15, frames / took
     exact = page.evaluate("window.exact_.size")
-    assert exact > 30, exact
+    assert exact > 2 * len(paused), (exact, paused)
     assert page.complaints == []
     assert before is not None
     grown = after["JSHeapUsedSize"] - before["JSHeapUsedSize"]

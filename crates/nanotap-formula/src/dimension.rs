@@ -45,9 +45,13 @@ fn words(exponents: [f64; 4]) -> String {
     units.join(" ")
 }
 
+/// Exponents of a length.
 const LENGTH: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
+/// Exponents of a speed.
 const SPEED: [f64; 4] = [0.0, 1.0, -1.0, 0.0];
+/// Exponents of a force.
 const FORCE: [f64; 4] = [1.0, 1.0, -2.0, 0.0];
+/// Exponents of one over a time.
 const FREQUENCY: [f64; 4] = [0.0, 0.0, -1.0, 0.0];
 
 /// Checks that every part has a dimension, and the whole the wanted one.

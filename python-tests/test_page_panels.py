@@ -234,7 +234,7 @@ def test_a_slider_is_dragged_for_a_minute(
           new MutationObserver(() => {
             const row = document.querySelector('#rows tbody tr');
             if (row && !row.classList.contains('approximate')) window.exact_.add(row.querySelector('td.distance').dataset.value);
-          }).observe(document.querySelector('#rows'), { childList: true, subtree: true, attributes: true, attributeFilter: ['class'] });
+          }).observe(document.body, { childList: true, subtree: true, attributes: true, attributeFilter: ['class'] });
         }"""
     )
     client = page.context.new_cdp_session(page)

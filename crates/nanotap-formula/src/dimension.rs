@@ -1,6 +1,6 @@
 //! The dimension of every part of a formula.
 
-use nanotap_quantity::Dimension;
+use nanotap_quantity::{Dimension, Kind};
 
 use crate::error::FormulaError;
 use crate::node::{Id, Node, Nodes, Operator};
@@ -25,6 +25,10 @@ fn exponents(dimension: Dimension) -> [f64; 4] {
     [mass, length, time, charge].map(f64::from)
 }
 
+fn of(kind: Kind) -> [f64; 4] {
+    exponents(kind.dimension())
+}
+
 fn same(a: [f64; 4], b: [f64; 4]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < EQUAL)
 }
@@ -45,15 +49,6 @@ fn words(exponents: [f64; 4]) -> String {
     units.join(" ")
 }
 
-/// Exponents of a length.
-const LENGTH: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
-/// Exponents of a speed.
-const SPEED: [f64; 4] = [0.0, 1.0, -1.0, 0.0];
-/// Exponents of a force.
-const FORCE: [f64; 4] = [1.0, 1.0, -2.0, 0.0];
-/// Exponents of one over a time.
-const FREQUENCY: [f64; 4] = [0.0, 0.0, -1.0, 0.0];
-
 /// Checks that every part has a dimension, and the whole the wanted one.
 pub(crate) fn check(
     (nodes, root): (&Nodes, Id),
@@ -62,9 +57,10 @@ pub(crate) fn check(
     parameters: &[Dimension],
     wanted: Dimension,
 ) -> Result<(), FormulaError> {
-    let second = memory.map_or(Ok(SPEED), |memory| of_memory(memory, text, parameters))?;
+    let rate = Ok(of(Kind::Velocity));
+    let second = memory.map_or(rate, |memory| of_memory(memory, text, parameters))?;
     let all: Vec<Id> = (0..nodes.len()).collect();
-    let known = dimensions(nodes, &all, text, parameters, [LENGTH, second])?;
+    let known = dimensions(nodes, &all, text, parameters, [of(Kind::Length), second])?;
     let wanted = exponents(wanted);
     match known[root] {
         Some(found) if !same(found, wanted) => Err(FormulaError::new(
@@ -82,7 +78,7 @@ pub(crate) fn is_length(
     text: &str,
     parameters: &[Dimension],
 ) -> Result<bool, FormulaError> {
-    Ok(same(of_memory(memory, text, parameters)?, LENGTH))
+    Ok(same(of_memory(memory, text, parameters)?, of(Kind::Length)))
 }
 
 /// The dimension of a memory `s' = gain F − decay s`.
@@ -92,12 +88,14 @@ fn of_memory(
     parameters: &[Dimension],
 ) -> Result<[f64; 4], FormulaError> {
     let nodes = &memory.nodes;
+    let [force, frequency] = [Kind::Force, Kind::Frequency].map(of);
+    // Gain and decay are of parameters alone.
     let known = |id: Id| {
-        let all = dimensions(nodes, &needed(nodes, id), text, parameters, [FORCE, SPEED])?;
+        let all = dimensions(nodes, &needed(nodes, id), text, parameters, [force; 2])?;
         Ok(all[id].unwrap_or_default())
     };
     let decay = known(memory.decay)?;
-    if !same(decay, FREQUENCY) {
+    if !same(decay, frequency) {
         let reason = format!(
             "the factor of {} is {}, where one over a time is needed",
             memory.name,
@@ -106,7 +104,7 @@ fn of_memory(
         return Err(FormulaError::new(text, nodes.place(memory.decay), reason));
     }
     let gain = known(memory.gain)?;
-    Ok(std::array::from_fn(|k| gain[k] + FORCE[k] - FREQUENCY[k]))
+    Ok(std::array::from_fn(|k| gain[k] + force[k] - frequency[k]))
 }
 
 /// The dimensions of these nodes, each of which stands after its parts, by node.

@@ -48,10 +48,8 @@ pub(crate) struct Parser<'a> {
     pub(crate) nodes: Nodes,
     pub(crate) parameters: Vec<String>,
     definitions: Vec<(String, Id)>,
-    /// Name of the memory, if there is one.
-    remembered: Option<String>,
-    /// Whether its equation is being read.
-    in_equation: bool,
+    /// Name of the memory whose equation is being read.
+    equation: Option<String>,
     pub(crate) memory: Option<Memory>,
 }
 
@@ -69,8 +67,7 @@ impl<'a> Parser<'a> {
             nodes: Nodes::default(),
             parameters: Vec::new(),
             definitions: Vec::new(),
-            remembered: None,
-            in_equation: false,
+            equation: None,
             memory: None,
         })
     }
@@ -129,8 +126,7 @@ impl<'a> Parser<'a> {
         }
         self.at += 2;
         self.expect("=", "the equation of a memory reads `s' = (F/k - s)/tau;`")?;
-        self.remembered = Some(name.clone());
-        self.in_equation = true;
+        self.equation = Some(name.clone());
         let outside = std::mem::take(&mut self.nodes);
         let start = self.start();
         let rate = self.sum()?;
@@ -144,7 +140,7 @@ impl<'a> Parser<'a> {
         }
         let decay = self.nodes.negative(growth);
         let nodes = std::mem::replace(&mut self.nodes, outside);
-        self.in_equation = false;
+        self.equation = None;
         self.memory = Some(Memory {
             name,
             nodes,
@@ -152,6 +148,12 @@ impl<'a> Parser<'a> {
             decay,
         });
         Ok(())
+    }
+
+    /// The name of the memory, also while its equation is being read.
+    fn memory_name(&self) -> Option<&str> {
+        let read = self.memory.as_ref().map(|memory| memory.name.as_str());
+        self.equation.as_deref().or(read)
     }
 
     fn error(&self, place: Range<usize>, reason: impl Into<String>) -> FormulaError {
@@ -335,7 +337,7 @@ impl<'a> Parser<'a> {
             let inner = self.deeper(Self::single)?;
             return Ok(Condition::Not(Box::new(inner)));
         }
-        if self.remembered.is_none() && self.takes_word("turned") {
+        if self.memory_name().is_none() && self.takes_word("turned") {
             return Ok(Condition::Test(Test::Turned));
         }
         // A parenthesis begins a condition or a number.
@@ -395,12 +397,11 @@ impl<'a> Parser<'a> {
         if is_function(name) || ["min", "max", "abs"].contains(&name) {
             return Err(self.error(place, format!("a function needs its argument: {name}(…)")));
         }
-        let is_memory = self.remembered.as_deref() == Some(name);
         match name {
-            "d" | "v" | "turned" if self.in_equation => Err(self.error(place, EQUATION)),
-            FORCE if self.in_equation => Ok(self.nodes.add(Node::Gap)),
-            _ if is_memory => Ok(self.nodes.add(Node::Rate)),
-            "v" | "turned" if self.remembered.is_some() => Err(self.error(
+            "d" | "v" | "turned" if self.equation.is_some() => Err(self.error(place, EQUATION)),
+            FORCE if self.equation.is_some() => Ok(self.nodes.add(Node::Gap)),
+            _ if self.memory_name() == Some(name) => Ok(self.nodes.add(Node::Rate)),
+            "v" | "turned" if self.memory.is_some() => Err(self.error(
                 place,
                 "a force with a memory depends on the gap and the memory alone",
             )),

@@ -149,7 +149,9 @@ pub struct Pieces {
     levels: Vec<f64>,
     /// The levels' own programs; none for the level at which contact begins.
     level_programs: Vec<Option<Evaluated>>,
-    contact: usize,
+    /// Number of the level at which contact begins; none over a moving surface.
+    contact: Option<usize>,
+    second: Second,
     pole: Option<f64>,
 }
 
@@ -318,11 +320,7 @@ impl Pieces {
             let (number, above) = (number(gap), slope > 0.0);
             known.insert(test, Known::Level { number, above });
         }
-        let contact = if outside.is_some() {
-            usize::MAX
-        } else {
-            number(contact)
-        };
+        let contact = outside.is_none().then(|| number(contact));
         let remembers = nodes.depends(root).turned;
         let mut pieces = Self {
             all: Vec::new(),
@@ -330,12 +328,13 @@ impl Pieces {
             levels,
             level_programs,
             contact,
+            second,
             pole: None,
         };
         let mut roots = Vec::new();
         for interval in (0..=pieces.levels.len()).rev() {
             for turned in [false, true] {
-                if turned && !(remembers && interval <= contact) {
+                if turned && !(remembers && contact.is_some_and(|level| interval <= level)) {
                     continue;
                 }
                 let mut open = match outside {
@@ -409,7 +408,7 @@ impl Pieces {
                 .exits_of(k)
                 .map_err(|reason| FormulaError::new(text, nodes.place(*root), reason))?;
         }
-        pieces.find_pole(text, &nodes, &roots, values, remembers_force)?;
+        pieces.find_pole(text, &nodes, &roots, values)?;
         Ok(pieces)
     }
 
@@ -435,10 +434,10 @@ impl Pieces {
             guards: (first..self.guards.len()).collect(),
             exits: Vec::new(),
             ends: [Smoothness::Analytic; 2],
-            // Of a moving surface the first condition tells.
-            touches: match decided.first() {
-                Some((.., outside)) if self.contact == usize::MAX => !outside,
-                _ => interval <= self.contact,
+            touches: match self.contact {
+                Some(level) => interval <= level,
+                // Over a moving surface the first condition is that of flight.
+                None => decided.first().is_some_and(|(.., flies)| !flies),
             },
             onsets: Vec::new(),
         });
@@ -485,13 +484,14 @@ impl Pieces {
         let piece = &self.all[k];
         let mut exits = Vec::new();
         if let Some(level) = piece.interval.checked_sub(1) {
-            let turned = piece.turned && level <= self.contact;
+            let turned = piece.turned && self.contact.is_some_and(|contact| level <= contact);
             let target = self.behind(level, turned, self.levels[level], -1.0)?;
             let end = End::Falls(level);
             exits.push(Exit { end, target });
         }
         if let Some(level) = self.levels.get(piece.interval) {
-            let turned = piece.turned && piece.interval < self.contact;
+            let turned =
+                piece.turned && self.contact.is_some_and(|contact| piece.interval < contact);
             let target = self.behind(piece.interval + 1, turned, *level, 1.0)?;
             let end = End::Rises(piece.interval);
             exits.push(Exit { end, target });
@@ -546,8 +546,8 @@ impl Pieces {
         nodes: &Nodes,
         roots: &[Id],
         values: &[f64],
-        remembers_force: bool,
     ) -> Result<(), FormulaError> {
+        let remembers_force = self.second != Second::Rate;
         for (piece, root) in self.all.iter().zip(roots) {
             let lower = piece
                 .interval

@@ -87,8 +87,8 @@ pub struct Remark {
 }
 
 /// The surface of a sample that relaxes, as decaying coordinates `η̇ = −rate η + gain F_s` that the
-/// tip's force `F_s` on the surface drives, in contact or at every gap. Their sum is the surface's depth to the
-/// power of the contact law, and takes the place of the gap's rate in the law.
+/// tip's force `F_s` on the surface drives, in contact or at every gap. Their sum is the surface's
+/// depth to the power of the contact law, and takes the place of the gap's rate in the law.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Rates at which the coordinates decay, positive, per unit of time; one per coordinate.

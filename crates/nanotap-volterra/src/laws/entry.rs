@@ -219,6 +219,11 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// Returns the names of the law's parameters.
+    pub fn parameter_names(&self) -> Vec<&'static str> {
+        self.parameters.iter().map(|p| p.name).collect()
+    }
+
     /// Returns the keys that cases have because of the law.
     pub fn keys(&self) -> impl Iterator<Item = KeyEntry> {
         self.parameters.iter().flat_map(|parameter| {

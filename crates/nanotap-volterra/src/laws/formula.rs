@@ -232,12 +232,7 @@ fn forces_at<F: Formula>(
 
 impl<F: Formula> ForceLaw for Law<F> {
     fn parameters(&self) -> Vec<&'static str> {
-        self.formula
-            .entry()
-            .parameters
-            .iter()
-            .map(|p| p.name)
-            .collect()
+        self.formula.entry().parameter_names()
     }
 
     fn branches(&self) -> usize {

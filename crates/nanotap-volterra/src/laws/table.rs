@@ -393,7 +393,7 @@ fn forces_at(
 
 impl ForceLaw for ForceTable {
     fn parameters(&self) -> Vec<&'static str> {
-        TABLE.entry.parameters.iter().map(|p| p.name).collect()
+        TABLE.entry.parameter_names()
     }
 
     fn branches(&self) -> usize {

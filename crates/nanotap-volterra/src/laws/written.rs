@@ -313,12 +313,7 @@ const fn approach(smoothness: Smoothness) -> Approach {
 
 impl ForceLaw for Written {
     fn parameters(&self) -> Vec<&'static str> {
-        self.writing
-            .entry
-            .parameters
-            .iter()
-            .map(|p| p.name)
-            .collect()
+        self.writing.entry.parameter_names()
     }
 
     fn branches(&self) -> usize {
@@ -539,7 +534,7 @@ impl AtRest {
 
 impl ForceLaw for AtRest {
     fn parameters(&self) -> Vec<&'static str> {
-        self.entry.parameters.iter().map(|p| p.name).collect()
+        self.entry.parameter_names()
     }
 
     fn branches(&self) -> usize {

@@ -1,11 +1,17 @@
 //! The reference levers with one mode, as case files.
 
 use nanotap::case::Case;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 
 /// Modal stiffness over static stiffness, β₁⁴/12 for a clamped-free beam.
 pub(crate) const MODAL: f64 = 12.362_363_368_400_15 / 12.0;
 /// Joules in an electronvolt.
 pub(crate) const EV: f64 = 1.602_176_634e-19;
+
+/// The orbit of a case, by the default search.
+pub(crate) fn found(case: &Case) -> OrbitReport {
+    orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap()
+}
 
 /// A lever of one mode with the modal stiffness `k` N/m at resonance, driven at its tip.
 pub(crate) fn lever(

@@ -6,9 +6,9 @@ use nanotap::case::document::equilibria;
 use nanotap::case::{Case, Key};
 use nanotap::model::galerkin::Galerkin;
 use nanotap::model::model_map::ModelMap;
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_dynamics::StroboscopicMap as _;
 
+use crate::common::found;
 use crate::derivatives::worst;
 
 fn case(words: &[&str]) -> Case {
@@ -25,10 +25,6 @@ fn case(words: &[&str]) -> Case {
     ];
     let all = all.iter().chain(words).map(|&word| word.to_owned());
     Case::parse(None, &all.collect::<Vec<_>>()).unwrap()
-}
-
-fn found(case: &Case) -> OrbitReport {
-    orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap()
 }
 
 /// A flat punch of 1 nm N/m per modulus on one arm: E∞ = 5, E₁ = 4 and so E₀ = 9 N/m, μ = E∞/(E₀ τ) and

@@ -7,8 +7,9 @@ use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::averaged_orbits::averaged_orbits;
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, report};
+use nanotap::study::orbit::{OrbitReport, report};
 
+use crate::common::found;
 use crate::derivatives::worst;
 
 const PIB: &str = "sample.arms=[[\"time (us)\", \"modulus (MPa)\"], [0.3832, 460], [1.671, 135.7], \
@@ -33,10 +34,6 @@ fn case(words: &[&str]) -> Case {
     ];
     let all = all.iter().chain(words).map(|&word| word.to_owned());
     Case::parse(None, &all.collect::<Vec<_>>()).unwrap()
-}
-
-fn found(case: &Case) -> OrbitReport {
-    orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap()
 }
 
 /// Amplitude in nm and phase in degrees.

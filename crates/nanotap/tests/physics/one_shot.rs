@@ -29,6 +29,17 @@ fn run(case: &Case, signal: &str, periods: usize) -> OneShot {
     one_shot(case, &read, &options, &Control::default()).unwrap()
 }
 
+/// A signal over so many drive periods, cut into pieces of one length.
+fn signal(of: &dyn Fn(f64) -> f64, length: f64, count: u32) -> ReadSignal {
+    let knot = |k| length * f64::from(k) / f64::from(count);
+    let knots: Vec<f64> = (0..=count).map(knot).collect();
+    ReadSignal {
+        words: "signal".into(),
+        length,
+        pieces: Pieces::new().of(of, &knots, 1.0).unwrap(),
+    }
+}
+
 /// Three modes over DMT.
 const LEVER: &str = "
     [model]
@@ -64,13 +75,7 @@ fn a_sine_is_the_periodic_drive() {
         stated(LEVER),
     ];
     for case in cases {
-        let knots: Vec<f64> = (0..=16).map(|k| 0.5 * f64::from(k)).collect();
-        let sine = |t: f64| (TAU * t).sin();
-        let read = ReadSignal {
-            words: "sine".into(),
-            length: 8.0,
-            pieces: Pieces::new().of(&sine, &knots, 1.0).unwrap(),
-        };
+        let read = signal(&|t: f64| (TAU * t).sin(), 8.0, 16);
         let found = one_shot(
             &case,
             &read,
@@ -257,14 +262,7 @@ fn laws_do_not_notice_the_cut() {
         });
         let pulse = |t: f64| -1.5 * (-0.5 * ((t - 2.0) / 0.3_f64).powi(2)).exp();
         let state = |count: u32| {
-            let knots: Vec<f64> = (0..=count)
-                .map(|k| 6.0 * f64::from(k) / f64::from(count))
-                .collect();
-            let read = ReadSignal {
-                words: "pulse".into(),
-                length: 6.0,
-                pieces: Pieces::new().of(&pulse, &knots, 1.0).unwrap(),
-            };
+            let read = signal(&pulse, 6.0, count);
             let found = one_shot(
                 &case,
                 &read,

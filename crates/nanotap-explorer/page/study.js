@@ -212,9 +212,7 @@ export function restore() {
     // In the language of now.
     tab.title = about(name);
     tab.lastChild.data = t("cards")[name] ?? name.replaceAll("-", " ");
-  }
-  for (const tab of $("tabs").children) {
-    const chosen = named(tab) === state.tab;
+    const chosen = name === state.tab;
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
     // Within the strip of cards alone: the page stays where it is.

@@ -24,6 +24,9 @@
 //! a phase `θ` at the first free resonance `Ω₁`: `G (w cos θ + ẇ sin θ/Ω₁)`. That is a term of rank one in
 //! each matrix, too: `C − (G sin θ/Ω₁) ppᵀ` and `K − (G cos θ) ppᵀ`.
 
+use std::cell::LazyCell;
+use std::ops::Deref;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::beam::Modes;
@@ -57,7 +60,7 @@ impl Correction {
             return Vec::new();
         }
         let dual = |number| case.dual(number, parameter);
-        let free = FreeModes::of(case, beam);
+        let free = LazyCell::new(|| FreeModes::of(case, beam));
         let mut all = Self::of_measured_modes(case, beam, &free, &dual);
         if case.has_q_control() {
             all.push(Self::of_q_control(beam, &free, &dual));
@@ -68,7 +71,7 @@ impl Correction {
     fn of_measured_modes(
         case: &Cantilever,
         beam: &Modes,
-        free: &FreeModes,
+        free: &impl Deref<Target = FreeModes>,
         dual: &impl Fn(Parameter) -> Dual,
     ) -> Vec<Self> {
         if !case.lever_modes.is_empty() {

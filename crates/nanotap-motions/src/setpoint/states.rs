@@ -2,8 +2,8 @@
 //!
 //! The lever is followed from far to the sample's own position and back. Its motions where the approach
 //! ends are sampled from several initial states, too, and from motions with the amplitude of the setpoint
-//! and several phases, at distances of about this amplitude; there the orbits are closed, too, that averaging
-//! knows, to however few starts they may be a limit. Each branch on the way, and each to which a
+//! and several phases, at distances of about this amplitude; there the orbits that averaging
+//! finds are closed, too: few starts may lead to them. Each branch on the way, and each to which a
 //! start leads, is continued round its folds, and every orbit on it that is at the setpoint is
 //! closed by Newton. A feedback loop holds those that are stable and on which the held quantity
 //! changes with the distance as it does on the approach.

@@ -89,7 +89,8 @@ impl<'a> Parser<'a> {
             }
             self.at += 2;
             let value = self.sum()?;
-            let defined = self.definitions.iter().any(|(other, _)| *other == name);
+            let defined = self.definitions.iter().any(|(other, _)| *other == name)
+                || self.memory_name() == Some(name.as_str());
             if defined || self.parameters.contains(&name) {
                 let reason = "it has a value already: a name is defined once, before it is used";
                 return Err(self.error(place, reason));

@@ -244,6 +244,7 @@ fn equations_that_no_engine_carries_are_refused() {
         ("s' = (F/k - s)/t; s", "where a force is needed"),
         ("s' = (F/k + s)/t; -k*s", "must decay at a positive rate"),
         ("s' = (F/k - s)/t; r' = (F/k - r)/t; -k*s", "stands first"),
+        ("s' = (F/k - s)/t; s = -d; k*s", "a name is defined once"),
         ("d' = (F/k - d)/t; -k*d", "a meaning of its own"),
     ] {
         let message = refused(force);

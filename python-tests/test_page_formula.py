@@ -145,6 +145,18 @@ def test_a_parameter_gets_its_field_and_slider(page: Any, address: str) -> None:
     assert "sample.parameters.eta" in offered
 
 
+def test_a_memory_is_said_and_no_end_without_a_level(page: Any, address: str) -> None:
+    opened(page, address)
+    caption = page.locator("#formula-curve figcaption")
+    assert "branches end at" in caption.inner_text()
+    typed(page, "s' = (F/E/R - s)*f; -E*R*(d + s)*step(-d - s)")
+    page.wait_for_selector("#formula-value-f")
+    page.fill("#formula-value-f", "500 kHz")
+    until(page, lambda: "memory is zero" in caption.inner_text())
+    # The branches of a moving surface end at no gap of their own.
+    assert "branches end at" not in caption.inner_text()
+
+
 def test_a_link_and_a_saved_case_hold_the_formula(page: Any, address: str) -> None:
     opened(page, address)
     typed(page, "4/3*stiff*sqrt(R)*max(-d, 0)^1.5\n  - c*v*step(-d)")

@@ -204,7 +204,7 @@ function range(forces) {
 }
 
 /** The force over the gap, with the ends of the formula's branches. */
-function curve({ points, levels, contact, speed }) {
+function curve({ points, levels, contact, speed, memory }) {
   const place = document.getElementById("formula-curve");
   let [low, high] = range(points.flatMap((row) => row.slice(1)));
   if (low === high) [low, high] = [-1e-12, 1e-12];
@@ -228,7 +228,9 @@ function curve({ points, levels, contact, speed }) {
     ...whole.filter((gap) => gap >= first && gap <= last).map((gap) => words([x(gap), HIGH - BOTTOM + 11], digits(gap * 1e9))),
     ...[low, high].filter((force) => force !== 0).map((force) => words([LEFT - 4, y(force) + 4], `${digits(force / factor)}${Math.abs(force) === size ? ` ${unit}` : ""}`, "end")), words([LEFT - 4, y(0) + 4], "0", "end"),
     words([(LEFT + WIDE) / 2, HIGH - 3], t("formula.gap")));
-  const said = [t("formula.ends", { ends: marks.map((gap) => `${Number((gap * 1e9).toPrecision(3))} nm`).join(", ") })];
+  const said = [];
+  if (marks.length) said.push(t("formula.ends", { ends: marks.map((gap) => `${Number((gap * 1e9).toPrecision(3))} nm`).join(", ") }));
+  if (memory) said.push(t("formula.memory"));
   if (speed) said.push(t("formula.ways", { speed: `${Number((speed * 1e3).toPrecision(3))} mm/s` }));
   place.replaceChildren(svg, make("figcaption", { className: "hint", textContent: said.join(" ") }));
 }

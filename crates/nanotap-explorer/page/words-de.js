@@ -73,6 +73,7 @@ export const german = {
     curve: "Die Kraft über dem Abstand",
     gap: "Abstand d (nm)",
     ends: "Senkrechte Linien: Die Zweige enden bei {ends}.",
+    memory: "Die Kurve ist die Kraft, solange das Gedächtnis null ist.",
     ways: "Durchgezogen: Annähern, gestrichelt: Zurückziehen, jeweils mit {speed}.",
     help: "Was eine Formel enthalten darf",
     language: [

@@ -64,6 +64,7 @@ const english = {
     curve: "The force over the gap",
     gap: "gap d (nm)",
     ends: "Vertical lines: the branches end at {ends}.",
+    memory: "The curve is the force while the memory is zero.",
     ways: "Solid: approaching, dashed: withdrawing, each at {speed}.",
     help: "What a formula may contain",
     language: [

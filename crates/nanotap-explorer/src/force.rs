@@ -141,7 +141,7 @@ fn drawn(app: &Explorer, request: &ForceRequest, case: &Case) -> Result<Value, M
     let [levels, points] = curve(&pieces, contact, speed);
     let mut answer = json!({
         "points": points, "levels": levels, "contact": contact, "speed": speed, "missing": [],
-        "keys": keys,
+        "keys": keys, "memory": formula.has_memory(),
     });
     if request.take {
         let set = changes(request, case, &parameters);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -216,6 +217,41 @@ def test_a_study_says_how_far_it_is(page: Any, address: str) -> None:
     page.click("#study-form button[type=submit]")
     until(page, lambda: "from1" in words(page, "#progress"))
     assert has_class(page, "#study-figure", "stale")
+
+
+def test_a_late_answer_does_not_take_the_slider(page: Any, address: str) -> None:
+    late = []
+
+    def later(route: Any) -> None:
+        late.append(route)
+
+    # The motion of the chosen state is answered after its setpoint has moved on, and before the states there.
+    page.route("**/api/motion*", later)
+    page.goto("about:blank")
+    page.goto(f"{address}#preset=dmt&set.drive.setpoint=0.8")
+    until(page, lambda: bool(late))
+    late.pop().continue_()
+    page.wait_for_selector("body[data-rows=done]")
+    until(page, lambda: bool(late))
+    box = page.locator("#setpoint-slider").bounding_box()
+    y = box["y"] + box["height"] / 2
+
+    def move(part: float) -> float:
+        page.mouse.move(box["x"] + part * box["width"], y)
+        return float(page.input_value("#setpoint").removesuffix(" %"))
+
+    page.mouse.move(box["x"] + 0.78 * box["width"], y)
+    page.mouse.down()
+    page.route("**/api/states*", lambda route: None)
+    seen = [move(0.7)]
+    for part in (0.6, 0.5, 0.4):
+        while late:
+            late.pop().continue_()
+        page.wait_for_timeout(300)
+        seen.append(move(part))
+    page.mouse.up()
+    page.unroute_all(behavior="ignoreErrors")
+    assert all(high > low for high, low in itertools.pairwise(seen)), seen
 
 
 def test_a_slider_is_dragged_for_a_minute(

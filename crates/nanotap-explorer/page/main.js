@@ -1,6 +1,6 @@
 // The page: what is set on the left, the chosen view on the right, and the displayed motion in detail below.
 
-import { state, basis, caseText, chosen, decode, names, remember, takeBase, texts, thatCase, theCase } from "./state.js";
+import { state, atChosen, basis, caseText, chosen, decode, names, remember, takeBase, texts, thatCase, theCase } from "./state.js";
 import { ask, bytes, save, stop, superseded } from "./api.js";
 import { fill, local, other, speak, t } from "./words.js";
 import { make } from "./element.js";
@@ -96,7 +96,7 @@ function request() {
   outdated = false;
   const wish = { case: thatCase(), start: state.start, steps: state.steps, ranges: !moving };
   if (follows() && caseText() !== displayed.text) Object.assign(wish, { from: displayed.case, start: displayed.start });
-  const asked = { ...wish, epoch, text: caseText(), basis: basis(), changes: Object.keys(state.set) };
+  const asked = { ...wish, epoch, text: caseText(), basis: basis(), changes: Object.keys(state.set), placed: atChosen() };
   const patience = setInterval(() => { if (outdated || asked.epoch !== epoch) stop("motion"); }, PATIENCE);
   const answer = ask("motion", "/api/motion", wish);
   return answer.then((motion) => ({ wish: asked, motion }), (error) => ({ wish: asked, error }))
@@ -116,7 +116,7 @@ function show(motion, wish) {
     remember(false);
   }
   stale(false);
-  motion.keys = atSetpoint(motion.keys);
+  if (wish.placed) motion.keys = atSetpoint(motion.keys);
   takeBase(wish.basis, { set: wish.changes }, motion.keys);
   knobs.follows(motion.readout);
   knobs.show(motion.keys, moving);
@@ -144,9 +144,9 @@ function show(motion, wish) {
 }
 
 /** The keys of a case at a setpoint: the motion is one at the distance of the chosen state, but what is stated is
- *  the setpoint. */
+ *  the setpoint. The answer may come after the setpoint has moved further, but not after a distance replaced it. */
 function atSetpoint(keys) {
-  if (!chosen.set || chosen.of !== caseText()) return keys;
+  if ("gap.tip" in state.set) return keys;
   const { held } = states.about();
   const said = state.set["drive.setpoint"] ?? (held?.kind === "amplitude" ? String(held.value) : held?.shown ?? "");
   const number = Number(said);

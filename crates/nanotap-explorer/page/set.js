@@ -45,7 +45,9 @@ export function show(next, about = info) {
   $("quick").hidden = !physical;
   formula.show(keys);
   if (!physical) { made = ""; $("quick").replaceChildren(); dock(); return; }
-  if (outline !== made) { made = outline; build(); }
+  // A slider that is held would be lost.
+  const held = $("quick").querySelector("input[type=range]:active");
+  if (outline !== made && !held) { made = outline; build(); }
   update();
 }
 

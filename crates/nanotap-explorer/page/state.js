@@ -117,5 +117,8 @@ export function theCase(distance = null) {
   return state.case ? { text: texts.get(state.case), set } : { preset: state.preset, set };
 }
 
+/** Whether the case stands at the distance of a chosen state, in place of its setpoint. */
+export const atChosen = () => Boolean(chosen.set) && chosen.of === caseText();
+
 /** The case at the distance of the chosen state. */
-export const thatCase = () => theCase(chosen.of === caseText() ? chosen.set : null);
+export const thatCase = () => theCase(atChosen() ? chosen.set : null);

@@ -300,7 +300,10 @@ def _in_memory(store: str, stopped: bool) -> "StudyDataset":
         for name, values in columns:
             old = ds[name]
             ds[name] = old.copy(data=np.reshape(values, old.shape))
-        ds = _worded(ds.load().drop_encoding())
+        ds = _worded(ds.load())
+        # Xarray's `drop_encoding` would copy all values.
+        for kept in (ds, *ds.variables.values()):
+            kept.encoding = {}
     if stopped:
         raise Interrupted("stopped; unfinished values are missing", ds)
     return ds

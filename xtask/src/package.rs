@@ -29,7 +29,7 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     for own in [
         "xtask",
         "nanotap-book",
-        "nanotap-page",
+        "nanotap-bundle",
         "nanotap-python",
         "nanotap-web",
     ] {

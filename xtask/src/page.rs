@@ -58,7 +58,7 @@ pub(crate) fn written(workspace: &Workspace) -> Result<Option<PathBuf>, String> 
     };
     let module = module(workspace, &compiler)?;
     let folder = workspace.target().join("page");
-    let mut page = workspace.cargo(&["run", "--release", "--package", "nanotap-page", "--"]);
+    let mut page = workspace.cargo(&["run", "--release", "--package", "nanotap-bundle", "--"]);
     page.arg(&workspace.root).arg(module).arg(&folder);
     must(&workspace.root, &mut page, "the page could not be written")?;
     Ok(Some(folder))
@@ -74,12 +74,12 @@ fn compared(workspace: &Workspace, folder: &Path) -> Result<Tally, String> {
     fs::create_dir_all(&answers)
         .map_err(|error| format!("cannot make {}: {error}", answers.display()))?;
     let mut native = workspace.cargo(&["run", "--release", "--package", "nanotap-explorer"]);
-    native.args(["--example", "answers", "--", "xtask/page/requests.json"]);
+    native.args(["--example", "answers", "--", "xtask/bundle/requests.json"]);
     // One thread, as in a browser's worker: the times can be compared.
     native.arg(&answers).env("RAYON_NUM_THREADS", "1");
     must(&workspace.root, &mut native, "the program did not answer")?;
     let mut compare = Command::new("node");
-    compare.arg("xtask/page/compare.mjs").arg(&answers);
+    compare.arg("xtask/bundle/compare.mjs").arg(&answers);
     compare.args(["nanotap.wasm", "nanotap-exact.wasm"].map(|name| folder.join(name)));
     check(&workspace.root, &mut compare)
 }

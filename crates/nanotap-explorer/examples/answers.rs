@@ -1,5 +1,5 @@
 //! Writes the answers to the requests of a file into a folder, with the seconds that each took: what
-//! `xtask/page/compare.mjs` compares with the answers of the WebAssembly module. A text `file:PATH` in a
+//! `xtask/bundle/compare.mjs` compares with the answers of the WebAssembly module. A text `file:PATH` in a
 //! request stands for the content of a file; the requests with these are written as well.
 
 #![expect(

@@ -47,7 +47,6 @@ mod maps;
 mod motion;
 mod motion_request;
 mod open;
-pub mod page;
 mod preset;
 mod readout;
 mod report;

@@ -1,5 +1,5 @@
-//! Measured curves and images: what instruments' files hold, calibrations of levers,
-//! parameters that a measurement determines, and the states of an image.
+//! Measured curves: what instruments' files hold, calibrations of levers, and parameters that a
+//! measurement determines.
 
 #![cfg_attr(
     test,
@@ -13,4 +13,3 @@ pub mod calibrate;
 pub mod figure;
 pub mod files;
 pub mod fit;
-pub mod image_states;

@@ -5,7 +5,9 @@ use nanotap_flow::regime::ModalOutput;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::begins_contact;
+use crate::begins_contact;
+use crate::frame::{Frame, Rows, frame};
+use nanotap_case::units::Units;
 use nanotap_model::Model;
 
 /// A switch between flight and contact.
@@ -32,6 +34,27 @@ pub enum ContactEventKind {
     ContactEnd,
     /// Impact on a rigid stop.
     Impact,
+}
+
+impl ContactEventKind {
+    /// Its name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ContactStart => "contact_start",
+            Self::ContactEnd => "contact_end",
+            Self::Impact => "impact",
+        }
+    }
+}
+
+/// The contacts of a motion as a table.
+pub fn contact_table(events: &[ContactEvent], units: Units) -> Frame<'_> {
+    frame! { Rows::new("contacts", events, Some(units));
+        "kind", "switch", Plain => |e| e.kind.name();
+        "tau", "time", (Time, Quantity([5, 5])) => |e| e.tau;
+        .si_name("time");
+        "gap_rate", "rate of the gap", (Velocity, Quantity([4, 4])) => |e| e.gap_rate;
+    }
 }
 
 /// Records the contacts of a motion during a run.

@@ -33,7 +33,7 @@ mod value;
 mod varied_motion;
 
 pub use clearance::Clearance;
-pub use contact_event::{ContactEvent, ContactEventKind, Contacts};
+pub use contact_event::{ContactEvent, ContactEventKind, Contacts, contact_table};
 pub use derivative::first_harmonic_changes;
 pub use derivative::{Derivative, DerivativeError};
 pub use dimension::Dimension;

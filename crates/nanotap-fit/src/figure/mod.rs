@@ -3,4 +3,3 @@
 pub mod calibrate;
 pub mod files;
 pub mod fit;
-pub mod image_states;

@@ -317,21 +317,27 @@ fn leave_out(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec
 
 /// Conversion of a column, from the option `convert`.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Conversion {
-    pub(crate) name: String,
+pub struct Conversion {
+    /// Name of the column, as written.
+    pub name: String,
     /// Value = `offset` + `factor` · x.
-    pub(crate) factor: f64,
-    pub(crate) offset: f64,
+    pub factor: f64,
+    /// Value at x = 0.
+    pub offset: f64,
     /// Units from and to, where the rule states them.
     units: Option<[String; 2]>,
     /// New name of the column, if the rule renames it.
-    pub(crate) renamed: Option<String>,
+    pub renamed: Option<String>,
 }
 
 const RULES: &str = "write NAME=RULE with a rule as in 58 nm/V, 90-x, -x, 1.02*x or amplitude";
 
 impl Conversion {
-    pub(crate) fn parse(text: &str) -> Result<Self, Error> {
+    /// Reads `NAME=RULE`, as in `phase=90-x` or `Deflection=58 nm/V`.
+    ///
+    /// # Errors
+    /// When a side is empty or the rule is none.
+    pub fn parse(text: &str) -> Result<Self, Error> {
         let wrong = |what: String| Error::option("convert", what, RULES);
         let (name, rule) = text
             .split_once('=')
@@ -398,7 +404,7 @@ impl Conversion {
     ///
     /// # Errors
     /// When the rule converts another unit; the message begins with the place.
-    pub(crate) fn unit(&self, unit: &str, place: impl FnOnce() -> String) -> Result<String, Error> {
+    pub fn unit(&self, unit: &str, place: impl FnOnce() -> String) -> Result<String, Error> {
         match &self.units {
             Some([from, to]) if unit.is_empty() || unit == *from => Ok(to.clone()),
             Some([from, _]) => Err(Error::option(

@@ -29,7 +29,7 @@ use nanotap_observe::PhysicalMotion;
 use nanotap_observe::frame::Frame;
 use nanotap_observe::time_series;
 use nanotap_observe::{
-    ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record,
+    ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, contact_table, record,
 };
 use nanotap_study::Study;
 use nanotap_study::in_si::InSi;
@@ -595,7 +595,8 @@ impl Study for SimulateStudy {
     /// sample it as finely as asked.
     fn frames<'a>(case: &Case, report: &'a SimulateReport) -> Vec<Frame<'a>> {
         match report {
-            SimulateReport::Exact(_) | SimulateReport::OneShot(_) => Vec::new(),
+            SimulateReport::Exact(run) => vec![contact_table(&run.motion.events, case.units())],
+            SimulateReport::OneShot(run) => vec![contact_table(&run.motion.events, case.units())],
             SimulateReport::FixedStep(run) => vec![run.curve_table(case.units())],
         }
     }

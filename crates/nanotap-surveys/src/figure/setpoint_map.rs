@@ -1,6 +1,6 @@
 //! The figure of the states at a held setpoint: which states there are, and the height of false steps.
 
-use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Panel};
+use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Panel, Points};
 
 use crate::figure::sweep::{GridAxis, GridScale};
 use crate::figure::window::outline;
@@ -34,6 +34,9 @@ const fn category(point: &SetpointPoint) -> usize {
     }
 }
 
+/// Diameter of the dot on a point at which states may be missing, mm.
+const DOT: f64 = 0.7;
+
 /// The map of the states, and where false steps are possible that of their heights.
 pub(crate) fn figure(store: &Store, window: &Window, map: &SetpointMap) -> Figure {
     let [y, x] = [0, 1].map(|axis| GridAxis::of(store, axis).shown());
@@ -53,6 +56,24 @@ pub(crate) fn figure(store: &Store, window: &Window, map: &SetpointMap) -> Figur
     let mut states = Panel::new(x.axis(), y.axis())
         .with(layer)
         .title("states at the setpoint");
+    // Where there are more states than were found, two are reason enough for a false step, and none
+    // does not mean that there is none.
+    let centres = y
+        .values
+        .iter()
+        .flat_map(|&y| x.values.iter().map(move |&x| (x, y)));
+    let open = centres
+        .zip(&points)
+        .filter(|(_, point)| point.undecided.is_some());
+    let open: Vec<(f64, f64)> = open.map(|(centre, _)| centre).collect();
+    let dots = || {
+        Points::new(open.clone())
+            .diameter(DOT)
+            .colour(Colour::BLACK)
+    };
+    if !open.is_empty() {
+        states = states.with(dots().label("more states possible"));
+    }
     let targets = window.targets.as_ref();
     if let Some(outline) = targets.and_then(|found| outline(found, &x, &y)) {
         states = states.with(outline);
@@ -68,9 +89,11 @@ pub(crate) fn figure(store: &Store, window: &Window, map: &SetpointMap) -> Figur
     });
     let scale = Axis::linear("").unit(unit.clone());
     let layer = GridScale::heatmap(&x, &y, heights, scale);
-    let steps = Panel::new(x.axis(), y.axis())
-        .with(layer)
-        .title(format!("height of the false step ({unit})"));
+    let mut steps = Panel::new(x.axis(), y.axis()).with(layer);
+    if !open.is_empty() {
+        steps = steps.with(dots());
+    }
+    let steps = steps.title(format!("height of the false step ({unit})"));
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .with(states)

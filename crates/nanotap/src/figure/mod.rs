@@ -1,6 +1,7 @@
 //! The figures: a description of each study's report, which `nanotap-figures` draws.
 
-pub use nanotap_fit::figure::{calibrate, files, fit, image_states};
+pub use nanotap_fit::figure::{calibrate, files, fit};
+pub use nanotap_images::figure as image_states;
 pub use nanotap_motions::figure::{
     approach, attractors, branch, contact, motion, panels, plotted_quantity,
 };

@@ -3,7 +3,8 @@
 
 pub mod registry;
 
-pub use nanotap_fit::{calibrate, fit, image_states};
+pub use nanotap_fit::{calibrate, fit};
+pub use nanotap_images::image_states;
 pub use nanotap_motions::simulate::{drive_signal, fixed_step, one_shot};
 pub use nanotap_motions::{
     approach, attractors, branch, event, frequency_modulation, lyapunov, orbit, proof, setpoint,

@@ -1,0 +1,148 @@
+//! Writes the page that needs no server: `nanotap-bundle REPOSITORY MODULE FOLDER`.
+//!
+//! The folder then has the page's files for any web server, with the module for machines that fuse
+//! multiply-adds and the one for those that do not, and `nanotap.html`, the same in one file.
+
+#![expect(
+    clippy::disallowed_methods,
+    reason = "it reads files of this repository"
+)]
+
+mod bundle;
+mod exact;
+mod single;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use nanotap::control::Control;
+use nanotap_explorer::Explorer;
+use serde_json::{Value, json};
+use sha2::{Digest as _, Sha256};
+
+use crate::exact::MultiplyAdd;
+
+/// The version of the page in its service worker, until the page is written.
+const VERSION: &str = "\"development\"";
+/// Its list of files until then.
+const FILES: &str = "[\"./\"]";
+const WORKER: &str = "service-worker.js";
+/// The first example of the page and what it holds, as in main.js.
+const FIRST: (&str, &str, &str) = ("dmt", "drive.setpoint", "0.8");
+
+/// Why the page was not written.
+#[derive(Debug, thiserror::Error)]
+enum PageError {
+    #[error("{}: {error}", path.display())]
+    File {
+        path: PathBuf,
+        error: std::io::Error,
+    },
+    #[error(transparent)]
+    Module(#[from] exact::ModuleError),
+    #[error(transparent)]
+    Bundle(#[from] bundle::BundleError),
+    #[error("{0} has no `{1}`")]
+    Without(&'static str, String),
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [repository, module, folder] = arguments.as_slice() else {
+        eprintln!("usage: nanotap-bundle REPOSITORY MODULE FOLDER");
+        return ExitCode::from(2);
+    };
+    match write(repository, module, folder) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageError> {
+    let source = repository.join("crates/nanotap-page/page");
+    let compiled = read(module)?;
+    let [fused, exact] = [MultiplyAdd::Kept, MultiplyAdd::Called]
+        .map(|multiply_add| exact::rewritten(&compiled, multiply_add));
+    let (fused, exact) = (fused?, exact?);
+    let mut texts = BTreeMap::new();
+    let listing = fs::read_dir(&source).map_err(of(&source))?;
+    for path in listing.flatten().map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let text = fs::read_to_string(&path).map_err(of(&path))?;
+        texts.insert(name.into_owned(), text);
+    }
+    let index = texts.entry(single::INDEX.into()).or_default();
+    let closed = format!("{}{}", first_states(), single::END);
+    *index = replaced(single::INDEX, index, single::END, &closed)?;
+    let whole = single::page(&texts, &fused, &exact)?;
+    // Another version of any file is another version of the page, which browsers then load anew.
+    let mut hash = Sha256::new();
+    for text in texts.values() {
+        hash.update(text);
+    }
+    hash.update(&fused);
+    let version = format!("\"{}\"", STANDARD.encode(hash.finalize()));
+    let names = texts.keys().map(String::as_str);
+    let names = names.filter(|name| ![single::INDEX, WORKER].contains(name));
+    let files = json!(["./"].into_iter().chain(names).collect::<Vec<_>>()).to_string();
+    let worker = texts.entry(WORKER.into()).or_default();
+    *worker = replaced(WORKER, worker, VERSION, &version)?;
+    *worker = replaced(WORKER, worker, FILES, &files)?;
+    fs::create_dir_all(folder).map_err(of(folder))?;
+    let modules = [("nanotap.wasm", &fused), ("nanotap-exact.wasm", &exact)];
+    let texts = texts
+        .iter()
+        .map(|(name, text)| (name.as_str(), text.as_bytes()));
+    let modules = modules
+        .iter()
+        .map(|(name, bytes)| (*name, bytes.as_slice()));
+    for (name, bytes) in texts
+        .chain(modules)
+        .chain([("nanotap.html", whole.as_bytes())])
+    {
+        let path = folder.join(name);
+        fs::write(&path, bytes).map_err(of(&path))?;
+        println!("{:>9} bytes  {}", bytes.len(), path.display());
+    }
+    Ok(())
+}
+
+/// What the page shows before its module is there: the states of its first example, with the case that they
+/// are of as `caseText` in state.js writes it.
+fn first_states() -> String {
+    let (preset, key, value) = FIRST;
+    let case = json!({ "preset": preset, "set": [format!("{key}={value}")] });
+    let answer = Explorer::new(None).ok().and_then(|explorer| {
+        let request = json!({ "case": case }).to_string();
+        let control = Control::default();
+        let answer = explorer.answer("/api/states", request.as_bytes(), &control, &|_| {});
+        serde_json::from_slice::<Value>(&answer.bytes).ok()
+    });
+    let first = json!({ "of": json!([preset, [[key, value]]]).to_string(), "answer": answer });
+    format!("<script type=\"application/json\" id=\"first\">{first}</script>\n")
+}
+
+/// The text of a file with the first occurrence of a part replaced.
+fn replaced(name: &'static str, text: &str, part: &str, by: &str) -> Result<String, PageError> {
+    if text.contains(part) {
+        Ok(text.replacen(part, by, 1))
+    } else {
+        Err(PageError::Without(name, part.to_owned()))
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, PageError> {
+    fs::read(path).map_err(of(path))
+}
+
+fn of(path: &Path) -> impl FnOnce(std::io::Error) -> PageError {
+    let path = path.to_owned();
+    move |error| PageError::File { path, error }
+}

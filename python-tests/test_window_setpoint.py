@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 LEVER = Path(__file__).parents[1] / "docs/cases/bistable-lever.toml"
-SETPOINT = 0.93
+SETPOINT = 0.9
 FREE = 10e-9
 
 
@@ -21,7 +21,7 @@ def case():
 
 @pytest.fixture(scope="module")
 def found(case):
-    over = ["sample.modulus=2GPa,70GPa", "sample.hamaker=6.4e-20,1.2e-19"]
+    over = ["sample.modulus=2GPa,70GPa", "sample.hamaker=20zJ,140zJ"]
     return nanotap.window(case, over=over)
 
 
@@ -59,11 +59,12 @@ def test_each_state_is_an_orbit_at_the_setpoint(case, found):
                 assert step == pytest.approx(apart, rel=1e-9)
             else:
                 assert np.isnan(step)
-    assert seen > 4
+    # More states than points.
+    assert seen > found["states"].size
 
 
 def test_it_says_where_false_steps_are_possible(found):
     both = int((found["states"] > 1).sum())
     assert both > 0
     assert found["step_height"].attrs["units"] == "m"
-    assert f"{25 * both} % of the points" in found.attrs["verdict"]
+    assert f"{25 * both:.1f} % of the points" in found.attrs["verdict"]

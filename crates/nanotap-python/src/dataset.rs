@@ -56,16 +56,21 @@ impl Recipe {
         let mut request = json(request)?;
         let file = request.as_object_mut().and_then(|all| all.remove("file"));
         let file = file.and_then(|file| file.as_str().map(PathBuf::from));
-        let studied = case.studied(py)?;
+        // Solved for once a case, not once a study.
+        let case = if file.is_some() || (entry.solves_distance)(&request).map_err(Failure::from)? {
+            case.at_any_distance()
+        } else {
+            case.studied(py)?
+        };
         let done = watched(py, progress, move |control| {
             Ok(install(threads, || match &file {
                 Some(path) => {
                     let options: FitOptions = read(request)?;
                     let name = path.display().to_string();
                     let options = options.of_map(&name, nanotap::files::open(path)?)?;
-                    FitMap::prepare(&studied, &options, control)
+                    FitMap::prepare(&case, &options, control)
                 }
-                None => entry.plan(&studied, request, control),
+                None => entry.plan(&case, request, control),
             })??)
         })?;
         Ok(Self {

@@ -72,6 +72,8 @@ pub struct StudyEntry {
     pub any_distance: bool,
     /// Runs it to its report, if that is a document.
     pub answer: Option<Run<Box<dyn Answer>>>,
+    /// Whether what is computed into a dataset by a request solves for distances itself.
+    pub solves_distance: fn(&Value) -> Result<bool, Error>,
     /// Plans what is to be computed into a dataset, if it leaves one.
     pub dataset: Option<Run<DatasetPlan>>,
     /// The JSON of the summary of its finished dataset, if it leaves one, and its figure.
@@ -140,6 +142,7 @@ impl StudyEntry {
                 let report = S::run(&case, &request, control)?;
                 Ok(Box::new(Answered::<S> { case, report }))
             }),
+            solves_distance: |_| Ok(S::ANY_DISTANCE),
             dataset: None,
             summary: None,
         }
@@ -148,9 +151,13 @@ impl StudyEntry {
     /// The same study, whose report can be a dataset, too.
     pub(super) const fn or_dataset<S: DatasetStudy>(self) -> Self {
         let Self {
-            dataset, summary, ..
+            solves_distance,
+            dataset,
+            summary,
+            ..
         } = Self::dataset::<S>();
         Self {
+            solves_distance,
             dataset,
             summary,
             ..self
@@ -168,6 +175,10 @@ impl StudyEntry {
             has_figure: true,
             any_distance: false,
             answer: None,
+            solves_distance: |request| {
+                let request = read::<S::Options>(request.clone())?;
+                Ok(S::solves_distance(&request))
+            },
             dataset: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
                 let case = if S::solves_distance(&request) {

@@ -323,7 +323,13 @@ def test_every_word_is_there_in_german(tongues: dict[str, Any]) -> None:
     english, german = leaves(tongues["en"]), leaves(tongues["de"])
     assert english.keys() <= german.keys()
     # What the program says itself in English has words only in German.
-    of_program = (("fields",), ("cards",), ("studies", "about"))
+    of_program = (
+        ("fields",),
+        ("cards",),
+        ("studies", "about"),
+        ("quantities",),
+        ("sentences",),
+    )
     for path in german.keys() - english.keys():
         assert any(path[: len(of)] == of for of in of_program), path
     for path, words in english.items():
@@ -338,6 +344,60 @@ def test_every_word_is_there_in_german(tongues: dict[str, Any]) -> None:
             and len(re.findall(r"[a-z]{3,}", plain)) > 1
         ):
             assert words != german[path], path
+
+
+PAGE = Path(__file__).parents[1] / "crates/nanotap-page/page/index.html"
+# Names of formats and languages, and of the program.
+TITLE = "nanotap: what a tapping lever does"
+NAMES = {"SVG", "PNG", "PDF", "CSV", "Python", "nanotap", TITLE}
+
+
+def test_the_page_itself_has_no_words() -> None:
+    """Words are in the files of words, so that none stays in English."""
+    text = re.sub(
+        r"<(script|style|noscript).*?</\1>|<!--.*?-->",
+        "",
+        PAGE.read_text(),
+        flags=re.DOTALL,
+    )
+    for words in re.findall(r">([^<>]*[A-Za-z]{2,}[^<>]*)<", text):
+        assert words.strip() in NAMES, words
+    assert re.findall(r'aria-label="([^"]*)"', text) == []
+
+
+def test_a_motion_is_described_in_german(page: Any, address: str) -> None:
+    quantity = "([name, words, list]) => import('./words.js').then((all) => all.quantity(name, words, list))"
+    sentences = "(text) => import('./words.js').then((all) => all.sentences(text))"
+    page.goto("about:blank")
+    page.goto(f"{address}#lang=de&view=studies&preset=dmt")
+    page.wait_for_selector("#readout dd")
+    cases = [{"preset": name} for name in ("dmt", "paper", "impact", "liquid")]
+    cases.append({"preset": "bistable", "set": ["drive.setpoint=0.8"]})
+    cases.append({"preset": "dmt", "set": ["gap.tip=100 nm"]})
+    for case in cases:
+        asked_for = {"case": case, "start": "", "steps": 0, "ranges": False}
+        motion = json.loads(asked(address, "/api/motion", asked_for))
+        for list_, rows in (
+            ("", motion["observables"]),
+            ("readout", motion["readout"]["lines"]),
+        ):
+            for row in rows:
+                german = page.evaluate(quantity, [row["name"], row["words"], list_])
+                assert german != row["words"], row
+        said = motion["readout"]["words"]
+        german = page.evaluate(sentences, said)
+        assert not re.search(r"\b(the|The|On)\b", german), german
+        # With the numbers of the English sentence.
+        numbers = [one.replace(".", ",") for one in re.findall(r"\d+(?:\.\d+)?", said)]
+        assert re.findall(r"\d+(?:,\d+)?", german) == numbers
+    for place, words in (
+        ("#known", "Diese Bewegung"),
+        ("#readout", "Maximalkraft"),
+        ("#observables", "größte Kraft der Probe"),
+        ("#phase", "Anregungsperiode"),
+        ("#lessons", "Periodenverdopplung"),
+    ):
+        assert words in page.text_content(place), place
 
 
 # Abbreviations, and the names of windows, are the same in both languages.

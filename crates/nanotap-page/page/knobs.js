@@ -3,15 +3,12 @@
 
 import { basis, state, put as state_put, theCase } from "./state.js";
 import { ask, superseded } from "./api.js";
-import { local } from "./words.js";
+import { local, t } from "./words.js";
 import { inField, question, understood } from "./entry.js";
 import { make } from "./element.js";
 
 const form = document.getElementById("knobs");
-const GROUPS = {
-  distance: "Distance or setpoint", drive: "Drive", sample: "Sample", lever: "Lever and tip",
-  model: "Numbers of the equations", more: "Further keys",
-};
+const GROUPS = ["distance", "drive", "sample", "lever", "model", "more"];
 const ALWAYS = ["cantilever.lever", "sample.law", "sample.material", "contact"];
 let changed = () => {};
 let refused = () => {};
@@ -30,17 +27,20 @@ export function onChange(onChanged, error) { changed = onChanged; refused = erro
 export function show(keys, keep = false) {
   const outline = (all) => JSON.stringify(all.map((key) => [key.name, key.value === "", key.stated, key.choices && key.value]));
   if ((keep || dragged()) && shown.length) update(keys, true);
-  else if (outline(keys) === outline(shown) && form.dataset.basis === basis()) update(keys, false);
+  else if (outline(keys) === outline(shown) && form.dataset.basis === madeFor()) update(keys, false);
   else build(keys);
   shown = keys;
 }
 
+/** What the controls are made for. */
+const madeFor = () => `${document.documentElement.lang} ${basis()}`;
+
 function build(keys) {
   const focused = document.activeElement?.id;
-  form.dataset.basis = basis();
+  form.dataset.basis = madeFor();
   form.replaceChildren();
   const places = (name) => keys.filter((key) => key.group === name);
-  for (const [name, title] of Object.entries(GROUPS)) {
+  for (const name of GROUPS) {
     const own = places(name);
     if (!own.length) continue;
     const said = (key) => own.some((other) => other.stated && other.alternatives.includes(key.name));
@@ -48,11 +48,11 @@ function build(keys) {
     const solved = (key) => key.name !== "drive.setpoint" && own.some((other) => other.name === "drive.setpoint" && other.stated);
     const first = name === "more" ? [] : own.filter((key) => (key.stated || ALWAYS.includes(key.name)) && !solved(key));
     const rest = own.filter((key) => !first.includes(key) && !(said(key) && key.value !== ""));
-    const box = make("fieldset", {}, make("legend", { textContent: title }), ...first.map((key) => knob(key, own)));
+    const box = make("fieldset", {}, make("legend", { textContent: t(`knobs.groups.${name}`) }), ...first.map((key) => knob(key, own)));
     box.dataset.group = name;
     if (rest.length) {
       const more = make("details", { open: opened.has(name) || (!first.length && name !== "more") },
-        make("summary", { textContent: name === "more" ? "modes, forms, second tone" : `${rest.length} more` }), ...rest.map((key) => knob(key, own)));
+        make("summary", { textContent: name === "more" ? t("knobs.further") : t("knobs.more", { count: rest.length }) }), ...rest.map((key) => knob(key, own)));
       more.addEventListener("toggle", () => { if (more.open) opened.add(name); else opened.delete(name); });
       box.append(more);
     }
@@ -99,7 +99,7 @@ function knob(key, own) {
   const others = key.stated ? own.filter((other) => key.alternatives.includes(other.name) && (other.value !== "" || other.name === "drive.setpoint")) : [];
   if (others.length) {
     const ways = make("select", { className: "switch" }, ...[key, ...others].map((one) => new Option(words(one), one.name)));
-    ways.setAttribute("aria-label", `${words(key)}, or another key for the same`);
+    ways.setAttribute("aria-label", t("knobs.other", { words: words(key) }));
     ways.dataset.switch = key.name;
     ways.addEventListener("change", () => {
       const other = others.find((one) => one.name === ways.value);

@@ -1,7 +1,7 @@
 // The lever in slow motion: the beam's shape from all its modes, the tip, and the indented sample.
 // Heights are drawn to scale; the lever's length is not.
 
-import { local } from "./words.js";
+import { t } from "./words.js";
 
 const canvas = document.getElementById("lever");
 const pen = canvas.getContext("2d");
@@ -18,7 +18,7 @@ export const frames = { drawn: 0 };
 export const moves = () => moving;
 
 play.addEventListener("click", () => { moving = !moving; label(); });
-function label() { play.textContent = moving ? "Pause" : "Play"; }
+function label() { play.dataset.t = moving ? "motion.pause" : "motion.play"; play.textContent = t(play.dataset.t); }
 label();
 
 /** Takes a new film: heights of the beam, of the surface and of the rest position, sample by sample. */
@@ -77,9 +77,9 @@ function draw() {
   pen.fillStyle = pen.strokeStyle;
   pen.beginPath(); pen.moveTo(right - 7 * ratio, y(tip)); pen.lineTo(right + 7 * ratio, y(tip)); pen.lineTo(right, y(film.apex[k])); pen.closePath(); pen.fill();
   pen.fillStyle = colour("--ink"); pen.font = `${size}px system-ui`;
-  pen.fillText(local(`height shown: ${film.scale}; length not to scale`), left, 1.35 * size);
-  pen.fillText(touching ? "contact" : "", right - 2 * size, height - 0.5 * size);
-  clock.textContent = `drive period ${Math.floor(time % film.periods) + 1} of ${film.periods}, phase ${(360 * (time % 1)).toFixed(0)}°`;
+  pen.fillText(t("motion.scale", { scale: film.scale }), left, 1.35 * size);
+  pen.fillText(touching ? t("motion.contact") : "", right - 2 * size, height - 0.5 * size);
+  clock.textContent = t("motion.clock", { period: Math.floor(time % film.periods) + 1, periods: film.periods, phase: (360 * (time % 1)).toFixed(0) });
   frames.drawn += 1;
 }
 

@@ -88,7 +88,7 @@ async function link(given) {
 }
 
 /** A QR code as a picture. */
-export function picture(rows, label = "QR code of the link") {
+export function picture(rows, label = t("linkWords.qr")) {
   const size = rows.length + 2 * MARGIN;
   const dark = rows.flatMap((row, y) => row.map((one, x) => (one ? `M${x + MARGIN} ${y + MARGIN}h1v1h-1z` : "")));
   const drawing = drawn("svg", { viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": label, "shape-rendering": "crispEdges" });
@@ -101,9 +101,9 @@ export async function share(given) {
   const address = await link(given);
   const rows = code(address);
   $("link-address").value = address;
-  $("link-code").replaceChildren(rows ? picture(rows) : "The link is too long for a QR code.");
+  $("link-code").replaceChildren(rows ? picture(rows) : t("linkWords.tooLong"));
   $("link").showModal();
   $("link-address").select();
   const copied = await navigator.clipboard?.writeText(address).then(() => true, () => false);
-  $("link-copied").textContent = copied ? "Copied. The link opens this view:" : "Copy this link; it opens this view:";
+  $("link-copied").textContent = t(copied ? "linkWords.copied" : "linkWords.copy");
 }

@@ -2,7 +2,7 @@
 
 import { state, atChosen, basis, caseText, chosen, decode, names, remember, takeBase, texts, thatCase, theCase } from "./state.js";
 import { ask, bytes, save, stop, superseded } from "./api.js";
-import { fill, local, other, speak, t } from "./words.js";
+import { fill, local, other, quantity, sentences, speak, t } from "./words.js";
 import { make } from "./element.js";
 import * as notice from "./notice.js";
 import * as quick from "./set.js";
@@ -21,23 +21,16 @@ const $ = (id) => document.getElementById(id);
 const FIRST = { "drive.setpoint": "0.8" }; // what the first example holds, as an instrument does
 const BUSY_DELAY = 300;        // milliseconds before the page shows that it computes
 const PATIENCE = 1000;         // milliseconds after which a motion gives way to a newer one
-const OFF = "0: off. Too few steps give motions that the equations do not have.";
 const CALM = 700;              // milliseconds without a change before coexisting motions are searched
 const SAME = 1e-4;             // relative difference of amplitudes below which a listed motion is the displayed one
-/** Guided starts: words of the link, address, and what to look at. */
-const LESSONS = {
-  bistable: ["Two motions at one distance", "view=studies&preset=dmt",
-    "At 18 nm this lever has two stable motions: “Coexisting motions” lists both. Press the other one. The tip then stops touching, the peak force goes from about 1 nN to zero and the phase from below 90° to above, although no value has changed. Which one an instrument shows depends on its history."],
-  phase: ["Why the phase turns", "view=studies&preset=dmt&set.gap.tip=24+nm",
-    "Far away the phase lags by 90°, at resonance. Move the distance from 24 nm to 19 nm: attraction lowers the resonance and the lag grows to 110°. At 18 nm a run from rest ends in repulsion, which raises the resonance: the lag falls to 68°. The curve of the phase shows both branches, with the present motion on it."],
-  doubling: ["Period doubling", "preset=paper&tab=diagram&ran=yes&study.key=omega&study.from=2.4&study.to=3.1",
-    "Each dot is the largest deflection in one drive period. Read from right to left: below Ω = 2.91 there are two dots, since the motion repeats only after two drive periods; around 2.6 it is chaotic. Click a dot: the lever above shows that motion."],
-  image: ["A false step in an image", "view=studies&preset=patch&tab=image&ran=yes",
-    "The sample is flat; between 150 nm and 300 nm a patch attracts the tip less. There the lever jumps from its attractive to its repulsive state and stays, so the height in the image changes although the surface does not, and trace and retrace differ."],
-  step: ["What a too coarse time step invents", "preset=paper&steps=80",
-    "The equations give a motion of period 1. “Comparison with fixed time steps”, at the bottom, shows what 80 Runge–Kutta steps per period make of it. Try 40, then 400."],
-  plan: ["An imaging window below a peak force", "preset=dmt&tab=plan&ran=yes&study.force=4+nN",
-    "The black line surrounds the free amplitudes and setpoints at which the peak force stays below 4 nN and no second motion exists. Click inside it: the case takes these values. Change the force, then press Compute."],
+/** Guided starts, whose words are `guides`: their addresses. */
+const GUIDES = {
+  bistable: "view=studies&preset=dmt",
+  phase: "view=studies&preset=dmt&set.gap.tip=24+nm",
+  doubling: "preset=paper&tab=diagram&ran=yes&study.key=omega&study.from=2.4&study.to=3.1",
+  image: "view=studies&preset=patch&tab=image&ran=yes",
+  step: "preset=paper&steps=80",
+  plan: "preset=dmt&tab=plan&ran=yes&study.force=4+nN",
 };
 const OPEN = "open";           // the entry of the list that opens a case file
 let about = null;
@@ -130,7 +123,7 @@ function show(motion, wish) {
   table(motion.observables);
   readout(motion);
   $("remarks").textContent = local(motion.remarks.join(" · "));
-  $("spurious").textContent = local(motion.fixed_step?.words ?? OFF);
+  $("spurious").textContent = motion.fixed_step ? local(motion.fixed_step.words) : t("motion.off");
   $("fixed").hidden = !motion.fixed_step?.figure;
   if (motion.fixed_step?.figure) figure.put($("fixed"), motion.fixed_step.figure);
   else figure.clear($("fixed"));
@@ -157,9 +150,9 @@ function atSetpoint(keys) {
 
 /** What one wants to know first. */
 function readout(motion) {
-  const lines = motion.readout.lines.map((line) => [line.name, line.words, line.shown]);
-  if (motion.distance) lines.unshift(["distance", "distance", motion.distance]);
-  lines.push(["regime", "regime", motion.readout.regime]);
+  const lines = motion.readout.lines.map((line) => [line.name, quantity(line.name, line.words, "readout"), line.shown]);
+  if (motion.distance) lines.unshift(["distance", t("motion.distance"), motion.distance]);
+  lines.push(["regime", t("motion.regime"), t("states.names")[motion.readout.regime]?.toLowerCase() ?? motion.readout.regime]);
   $("readout").replaceChildren(...lines.flatMap(([name, words, shown]) => {
     const [title, value] = ["dt", "dd"].map((tag) => document.createElement(tag));
     title.textContent = words;
@@ -167,20 +160,20 @@ function readout(motion) {
     value.dataset.read = name;
     return [title, value];
   }));
-  $("regime").textContent = local(motion.readout.words);
+  $("regime").textContent = sentences(motion.readout.words);
 }
 
 /** Values change in place; lines are recreated if the set of observables changes. */
 function table(rows) {
   const body = $("observables").tBodies[0];
-  const names = rows.map((row) => row.name).join();
+  const names = [document.documentElement.lang, ...rows.map((row) => row.name)].join();
   if (body.dataset.names !== names) {
     body.dataset.names = names;
     body.replaceChildren(...rows.map((row) => {
       const line = document.createElement("tr");
       const name = document.createElement("th");
       name.scope = "row";
-      name.textContent = row.words;
+      name.textContent = quantity(row.name, row.words);
       const value = document.createElement("td");
       value.dataset.observable = row.name;
       line.append(name, value);
@@ -252,7 +245,7 @@ function markCensus() {
   $("states-here").textContent = "";
   if (!found) return;
   const other = searched() !== found.of;
-  if (!other && found.stable > 1) $("states-here").textContent = `${found.stable} stable motions coexist here: one click each, below.`;
+  if (!other && found.stable > 1) $("states-here").textContent = t("motion.several", { count: found.stable });
   $("attractors").classList.toggle("stale", other);
   for (const button of $("attractors").querySelectorAll("button")) {
     const own = Number(button.dataset.amplitude);
@@ -320,9 +313,9 @@ async function takeOver() {
   $("steps").value = state.steps;
   $("follow").checked = state.follow === "yes";
   $("note").textContent = wrong && `${wrong} ${t("fromLink.first")}`;
-  const lesson = LESSONS[state.lesson];
-  $("lesson").hidden = !lesson;
-  $("lesson").firstElementChild.textContent = lesson ? local(`${lesson[0]}. ${lesson[2]}`) : "";
+  const guide = Object.hasOwn(GUIDES, state.lesson) && t("guides")[state.lesson];
+  $("lesson").hidden = !guide;
+  $("lesson").firstElementChild.textContent = guide ? local(guide.join(". ")) : "";
   if (!found) { $("attractors").replaceChildren(); $("bound").textContent = ""; }
   notice.tell("");
   if (lecture.wanted()) { lecture.open(); return; }
@@ -395,9 +388,11 @@ async function begin() {
   }
   const yours = make("optgroup", { id: "yours", label: t("opened") });
   $("preset").append(yours, ...groups.values(), new Option(t("openFile"), OPEN));
-  $("lessons").append(...Object.entries(LESSONS).map(([name, [words, address]]) => {
+  $("lessons").append(...Object.entries(GUIDES).map(([name, address]) => {
     const item = document.createElement("li");
-    item.append(make("a", { href: `#${address}&lesson=${name}`, textContent: words }));
+    const link = make("a", { href: `#${address}&lesson=${name}`, textContent: t(`guides.${name}.0`) });
+    link.dataset.t = `guides.${name}.0`;
+    item.append(link);
     return item;
   }));
   $("lessons").addEventListener("click", () => { $("learn").open = false; });

@@ -285,6 +285,62 @@ const english = {
     leverNone: "No lever of the catalogue would do at this free amplitude and setpoint.",
     leverHeads: { lever: "lever", k: "stiffness", f: "resonance", tip: "tip radius", force: "presses with", regime: "state", states: "states", line: "256 points, there and back, take", fits: "fits your wishes?" },
   },
+  motion: {
+    parameters: "Parameters of the case", guide: "Guided start", closeGuide: "Close the guided start",
+    bench: "Parameter studies",
+    tabs: "Studies",
+    lever: "Lever and sample in slow motion",
+    pause: "Pause",
+    play: "Play",
+    clock: "drive period {period} of {periods}, phase {phase}°",
+    scale: "height shown: {scale}; length not to scale",
+    contact: "contact",
+    studyFigure: "Figure of the study",
+    save: "Save, command line, Python",
+    command: "Command line",
+    commandOf: "Command line of the study",
+    pythonOf: "Python code of the study",
+    python: "Python code",
+    known: "This motion, and those that coexist",
+    this: "This motion",
+    coexisting: "Coexisting motions",
+    unstable: "include unstable orbits",
+    several: "{count} stable motions coexist here: one click each, below.",
+    motion: "The motion",
+    detail: "The motion in detail",
+    contactFigure: "Height above the sample and force on the tip against time; force against height",
+    portraitFigure: "Deflection against time, phase portrait, harmonics and multipliers",
+    keys: "In every figure: drag a rectangle to zoom, or hold Ctrl and turn the wheel; double-click or press 0 to show everything. Keys: arrows move the cross, N selects the next panel, + and − zoom, Enter selects the point.",
+    files: "Files and numbers of the motion",
+    saveThis: "Save this motion",
+    figure: "Figure",
+    figureMotion: "motion",
+    figureContact: "height and force",
+    caseFile: "Case file",
+    code: "Command line, Python",
+    observables: "Observables",
+    quantity: "quantity",
+    value: "value",
+    regime: "regime",
+    distance: "distance",
+    fixed: "Comparison with fixed time steps",
+    steps: "Runge–Kutta steps per period",
+    fixedFigure: "Motion with fixed time steps",
+    off: "0: off. Too few steps give motions that the equations do not have.",
+  },
+  guides: {
+    bistable: ["Two motions at one distance", "At 18 nm this lever has two stable motions: “Coexisting motions” lists both. Press the other one. The tip then stops touching, the peak force goes from about 1 nN to zero and the phase from below 90° to above, although no value has changed. Which one an instrument shows depends on its history."],
+    phase: ["Why the phase turns", "Far away the phase lags by 90°, at resonance. Move the distance from 24 nm to 19 nm: attraction lowers the resonance and the lag grows to 110°. At 18 nm a run from rest ends in repulsion, which raises the resonance: the lag falls to 68°. The curve of the phase shows both branches, with the present motion on it."],
+    doubling: ["Period doubling", "Each dot is the largest deflection in one drive period. Read from right to left: below Ω = 2.91 there are two dots, since the motion repeats only after two drive periods; around 2.6 it is chaotic. Click a dot: the lever above shows that motion."],
+    image: ["A false step in an image", "The sample is flat; between 150 nm and 300 nm a patch attracts the tip less. There the lever jumps from its attractive to its repulsive state and stays, so the height in the image changes although the surface does not, and trace and retrace differ."],
+    step: ["What a too coarse time step invents", "The equations give a motion of period 1. “Comparison with fixed time steps”, at the bottom, shows what 80 Runge–Kutta steps per period make of it. Try 40, then 400."],
+    plan: ["An imaging window below a peak force", "The black line surrounds the free amplitudes and setpoints at which the peak force stays below 4 nN and no second motion exists. Click inside it: the case takes these values. Change the force, then press Compute."],
+  },
+  linkWords: { qr: "QR code of the link", tooLong: "The link is too long for a QR code.", copied: "Copied. The link opens this view:", copy: "Copy this link; it opens this view:", address: "Link to this view" },
+  knobs: {
+    groups: { distance: "Distance or setpoint", drive: "Drive", sample: "Sample", lever: "Lever and tip", model: "Numbers of the equations", more: "Further keys" },
+    further: "modes, forms, second tone", more: "{count} more", other: "{words}, or another key for the same",
+  },
   studies: {
     heading: "Further studies",
     lessons: "Lessons",
@@ -500,6 +556,23 @@ export function worded(form, { name, words, about = "", hint = "", choices = [] 
   const { of, hints, choices: texts } = chosen.fields;
   const own = of[form]?.[name] ?? {};
   return { words: own.words ?? words, about: own.about ?? about, hint: own.hint ?? hints[hint] ?? hint, choices: choices.map((choice) => own.choices?.[choice] ?? texts[choice] ?? choice) };
+}
+
+/** The words of a quantity in the chosen language, or else the program's own; those of a list such as the readout,
+ *  which has shorter ones. */
+export function quantity(name, words, list = "") {
+  const own = list ? chosen.quantities?.[list] : chosen.quantities;
+  return own?.[name] ?? words;
+}
+
+/** Sentences of the program in the chosen language; one that it does not have stays. */
+export function sentences(text) {
+  const said = text.split(/(?<=\.) /).map((one) => {
+    const numbers = one.match(/\d+(\.\d+)?/g) ?? [];
+    const own = chosen.sentences?.[one.replace(/\d+(\.\d+)?/g, "#")];
+    return own?.replace(/#/g, () => numbers.shift()) ?? one;
+  });
+  return local(said.join(" "));
 }
 
 /** Puts the words into the page: an element names its own by `data-t`, its label by `data-t-label`. */

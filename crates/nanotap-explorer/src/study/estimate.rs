@@ -61,7 +61,8 @@ impl Trial {
     pub(super) fn ended(&self, is_complete: bool) {
         if let Some(tried) = locked(&self.stages).last_mut() {
             tried.is_complete = is_complete;
-            if is_complete || tried.done == 0 {
+            // After a part that is complete another one follows, which takes at least the rest of the trial.
+            if is_complete || tried.done == 0 || tried.done == tried.total {
                 tried.took = tried.begun.elapsed();
             }
         }

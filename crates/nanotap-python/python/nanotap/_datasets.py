@@ -302,8 +302,9 @@ def _in_memory(store: str, stopped: bool) -> "StudyDataset":
             ds[name] = old.copy(data=np.reshape(values, old.shape))
         ds = _worded(ds.load())
         # Xarray's `drop_encoding` would copy all values.
-        for kept in (ds, *ds.variables.values()):
-            kept.encoding = {}
+        ds.encoding = {}
+        for variable in ds.variables.values():
+            variable.encoding = {}
     if stopped:
         raise Interrupted("stopped; unfinished values are missing", ds)
     return ds

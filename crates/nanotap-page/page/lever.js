@@ -18,7 +18,7 @@ export const frames = { drawn: 0 };
 export const moves = () => moving;
 
 play.addEventListener("click", () => { moving = !moving; label(); });
-function label() { play.dataset.t = moving ? "motion.pause" : "motion.play"; play.textContent = t(play.dataset.t); }
+function label() { play.dataset.t = moving ? "states.pause" : "states.play"; play.textContent = t(play.dataset.t); }
 label();
 
 /** Takes a new film: heights of the beam, of the surface and of the rest position, sample by sample. */

@@ -390,7 +390,7 @@ async function begin() {
   $("preset").append(yours, ...groups.values(), new Option(t("openFile"), OPEN));
   $("lessons").append(...Object.entries(GUIDES).map(([name, address]) => {
     const item = document.createElement("li");
-    const link = make("a", { href: `#${address}&lesson=${name}`, textContent: t(`guides.${name}.0`) });
+    const link = make("a", { href: `#${address}&lesson=${name}` });
     link.dataset.t = `guides.${name}.0`;
     item.append(link);
     return item;

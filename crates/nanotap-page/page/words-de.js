@@ -191,8 +191,6 @@ export const german = {
     bench: "Parameterstudien",
     tabs: "Studien",
     lever: "Cantilever und Probe in Zeitlupe",
-    pause: "Anhalten",
-    play: "Abspielen",
     clock: "Anregungsperiode {period} von {periods}, Phase {phase}°",
     scale: "gezeigte Höhe: {scale}; Länge nicht maßstäblich",
     contact: "Kontakt",

@@ -290,8 +290,6 @@ const english = {
     bench: "Parameter studies",
     tabs: "Studies",
     lever: "Lever and sample in slow motion",
-    pause: "Pause",
-    play: "Play",
     clock: "drive period {period} of {periods}, phase {phase}°",
     scale: "height shown: {scale}; length not to scale",
     contact: "contact",

@@ -47,6 +47,14 @@ impl CaseCore {
         Ok(Arc::clone(&self.solved(py)?.0))
     }
 
+    /// The case as a study takes it: at any distance if the study solves for distances itself.
+    pub(crate) fn studied_unless(&self, solves: bool, py: Python<'_>) -> PyResult<Arc<Case>> {
+        if solves {
+            return Ok(self.at_any_distance());
+        }
+        self.studied(py)
+    }
+
     fn solved(&self, py: Python<'_>) -> PyResult<&Solved> {
         if let Some(solved) = self.at_setpoint.get() {
             return Ok(solved);
@@ -67,11 +75,7 @@ impl CaseCore {
         let distance = [Key::GapTip, self.case.gap_key()];
         let of_distance =
             |name: &String| self.case.key(name).is_ok_and(|key| distance.contains(&key));
-        let start = if keys.iter().any(of_distance) {
-            self.at_any_distance()
-        } else {
-            self.studied(py)?
-        };
+        let start = self.studied_unless(keys.iter().any(of_distance), py)?;
         Ok(Variants {
             case: self.at_any_distance(),
             start,

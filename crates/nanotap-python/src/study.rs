@@ -142,12 +142,7 @@ pub(crate) fn study(
 ) -> PyResult<(ReportCore, bool)> {
     let entry = entry(name)?;
     let request = json(request)?;
-    // Solved for once a case, not once a study.
-    let case = if entry.any_distance {
-        case.at_any_distance()
-    } else {
-        case.studied(py)?
-    };
+    let case = case.studied_unless(entry.any_distance, py)?;
     let done = watched(py, progress, move |control| {
         Ok(install(threads, || entry.answer(&case, request, control))??)
     })?;

@@ -24,6 +24,7 @@ use nanotap_case::units::Units;
 use nanotap_error::Error;
 use nanotap_model::model_map::ModelMap;
 use nanotap_model::{FlowError, Model};
+use nanotap_observe::ContactEventKind;
 use nanotap_observe::frame::{Frame, Rows, frame};
 
 /// Drive periods discarded first, unless the options say otherwise.
@@ -290,9 +291,9 @@ impl<'a> Observed<'a> {
         let contact = self.model.gap.at(drive, x, phase) <= 0.0;
         if contact != self.contact {
             let kind = if contact {
-                "contact_start"
+                ContactEventKind::ContactStart.name()
             } else {
-                "contact_end"
+                ContactEventKind::ContactEnd.name()
             };
             if self.events.len() < self.most_events {
                 self.events.push(GridEvent { tau, kind });

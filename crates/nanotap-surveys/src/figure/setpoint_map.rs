@@ -56,8 +56,8 @@ pub(crate) fn figure(store: &Store, window: &Window, map: &SetpointMap) -> Figur
     let mut states = Panel::new(x.axis(), y.axis())
         .with(layer)
         .title("states at the setpoint");
-    // Where there are more states than were found, two are reason enough for a false step, and none
-    // does not mean that there is none.
+    // States may be missing at these points: what was found is drawn, and where no step is drawn
+    // there may be one.
     let centres = y
         .values
         .iter()

@@ -156,7 +156,7 @@ function values() {
     const missing = answer.missing.includes(one.name);
     parts.box.querySelector("label").textContent = missing ? t("formula.missing", { name: one.name }) : one.name;
     parts.hint.textContent = one.key.startsWith(PARAMETERS) || missing ? "" : own?.title ?? "";
-    parts.range.hidden = !own?.slider || edited.has(one.name);
+    parts.range.hidden = !own?.slider;
     if (!edited.has(one.name) && document.activeElement !== parts.text) parts.text.value = inField(own?.value || former.get(one.name) || "");
     // While a slider moves, its range stays.
     if (!own?.slider || parts.range.matches(":active")) continue;
@@ -174,7 +174,13 @@ function added(place, { name, key: path }) {
   parts.text.addEventListener("change", () => {
     const own = key(parts.path);
     const meant = own?.unit ? understood(parts.text.value, own) : { text: pointed(parts.text.value.trim()) };
-    const use = (value) => { parts.text.value = inField(value); edited.set(name, value); now(); };
+    const use = (value) => {
+      parts.text.value = inField(value);
+      // Taken while it was typed.
+      if (!edited.has(name) && value === statedText(parts.path)) return;
+      edited.set(name, value);
+      now();
+    };
     if (meant.instead) { for (const timer of timers) clearTimeout(timer); question(parts.text, meant, use); } else use(meant.text);
   });
   const move = (finished) => {
@@ -183,6 +189,8 @@ function added(place, { name, key: path }) {
     const value = `${Number((log ? from * (to / from) ** part : from + (to - from) * part).toPrecision(4))} ${key(parts.path).unit}`.trim();
     parts.text.value = inField(value);
     parts.range.setAttribute("aria-valuetext", parts.text.value);
+    // Instead of what was typed.
+    edited.delete(name);
     page.say(parts.path, value, finished);
   };
   parts.range.addEventListener("input", () => move(false));

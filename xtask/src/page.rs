@@ -12,7 +12,8 @@ use crate::tools::{self, Workspace};
 const TARGET: &str = "wasm32-unknown-unknown";
 /// What the module may use: every browser of today has 128-bit vectors; where multiply-adds are not fused,
 /// the page takes the module without them.
-const FLAGS: &str = "-Ctarget-feature=+simd128,+relaxed-simd";
+/// The names of functions contain the crates of their types, by which the page's module is split.
+const FLAGS: &str = "-Ctarget-feature=+simd128,+relaxed-simd -Csymbol-mangling-version=v0";
 /// Debian's compiler of the version that its browsers are built with, and the sources of its library.
 const PACKAGES: [&str; 2] = ["rustc-web", "rust-web-src"];
 

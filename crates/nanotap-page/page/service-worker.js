@@ -4,12 +4,12 @@
 const VERSION = "development"; // `cargo xtask page` states a hash of all files here.
 const FILES = ["./"]; // … and the names of the others here.
 const PREFIX = "nanotap ";
-// The browser runs one of the two modules.
+// The browser runs one of the two modules, each in two parts.
 const MODULE = new URL(location.href).searchParams.get("module");
 const NAME = `${PREFIX}${registration.scope} ${MODULE} ${VERSION}`;
 
 addEventListener("install", (event) => {
-  const requests = [...FILES, `${MODULE}.wasm`].map((file) => new Request(file, { cache: "no-cache" }));
+  const requests = [...FILES, `${MODULE}.wasm`, `${MODULE}-second.wasm`].map((file) => new Request(file, { cache: "no-cache" }));
   event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(requests)));
 });
 

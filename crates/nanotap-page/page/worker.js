@@ -1,6 +1,8 @@
 // A worker of the page: one instance of the core, which answers the requests of the page in sequence.
 
 let core = null;
+let second = null;            // the second part of the module, once it was needed
+let address = "";             // where it is
 let panic = "";
 const decoder = new TextDecoder();
 const encoder = new TextEncoder();
@@ -14,11 +16,18 @@ const imports = { nanotap: {
     const bytes = at(start, length).slice();
     postMessage({ answered: answered === 1, kind: text(kind, kindLength), bytes }, [bytes.buffer]);
   },
+  // Functions that the first view does not need; a call waits for them.
+  second: () => {
+    second ??= loaded();
+    new WebAssembly.Instance(second, { first: core });
+  },
   panicked: (start, length) => { panic = text(start, length); },
 } };
 
-onmessage = ({ data: { module, path, body } }) => {
+onmessage = ({ data: { module, path, body, ...own } }) => {
   try {
+    ({ address } = own);
+    second ??= own.second;
     core ??= new WebAssembly.Instance(module, imports).exports;
     const [name, rest] = [path, body].map((words) => encoder.encode(words));
     const length = name.length + rest.length;
@@ -30,6 +39,18 @@ onmessage = ({ data: { module, path, body } }) => {
     postMessage({ failed: `${reason(error)}; the page goes on` });
   }
 };
+
+function loaded() {
+  const request = new XMLHttpRequest();
+  request.open("GET", address, false);
+  request.responseType = "arraybuffer";
+  request.send();
+  if (request.status !== 200) throw new Error(`${address} cannot be loaded: ${request.status} ${request.statusText}`);
+  const module = new WebAssembly.Module(request.response);
+  // For the next worker.
+  postMessage({ second: module });
+  return module;
+}
 
 /** Why the core is of no use any more. */
 function reason(error) {

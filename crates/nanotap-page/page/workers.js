@@ -6,6 +6,7 @@ const NAMES = { "/api/states": "states", "/api/curve": "curve", "/api/attractors
 const TOO_OLD = "this browser cannot run nanotap, which needs WebAssembly with SIMD and the decompression of streams: use one of 2023 or later";
 const workers = new Map();
 let compiled = null;
+let second = null;            // the part of the module that is loaded on demand, once a worker has loaded it
 
 /** Sends a request. Passes the lines of a streamed answer to `line`, if given; returns whether the request
  *  was answered, the media type and the bytes; those of a refusal are JSON. */
@@ -17,7 +18,7 @@ export async function send(path, body, signal, line = () => {}) {
   if (!workers.has(name)) workers.set(name, new Queue());
   const queue = workers.get(name);
   return new Promise((fulfil, refuse) => {
-    const request = { message: { module, path, body: body === undefined ? "" : JSON.stringify(body) }, line, fulfil, refuse };
+    const request = { message: { module, path, body: body === undefined ? "" : JSON.stringify(body), address: `./${moduleName()}-second.wasm` }, line, fulfil, refuse };
     signal.addEventListener("abort", () => { queue.drop(request); refuse(signal.reason); });
     queue.add(request);
   });
@@ -36,7 +37,7 @@ class Queue {
   begin() {
     if (!this.requests.length) return;
     this.worker ??= this.started();
-    this.worker.postMessage(this.requests[0].message);
+    this.worker.postMessage({ ...this.requests[0].message, second });
   }
 
   started() {
@@ -47,6 +48,7 @@ class Queue {
   }
 
   take({ line, failed, ...answer }) {
+    if (answer.second) { second = answer.second; return; }
     const [request] = this.requests;
     try {
       if (line !== undefined) { request.line(line); return; }

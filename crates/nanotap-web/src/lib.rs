@@ -19,6 +19,8 @@ unsafe extern "C" {
     fn line(start: *const u8, length: usize);
     /// The answer: whether the request was answered, its media type, its content.
     fn reply(answered: u32, kind: *const u8, kind_length: usize, start: *const u8, length: usize);
+    /// Loads the functions of the second part of the module, which the page loads on demand.
+    fn second();
     /// The words of a panic, after which the module is of no use.
     fn panicked(start: *const u8, length: usize);
 }
@@ -31,6 +33,13 @@ static EXPLORER: LazyLock<Result<Explorer, Error>> = LazyLock::new(|| {
     }));
     Explorer::new(None)
 });
+
+/// Loads the second part of the module: called once, by the functions that are in it.
+#[unsafe(no_mangle)]
+pub extern "C" fn load() {
+    // SAFETY: it takes and returns nothing.
+    unsafe { second() };
+}
 
 /// Room for a request.
 #[unsafe(no_mangle)]

@@ -11,6 +11,7 @@
 mod bundle;
 mod exact;
 mod single;
+mod split;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -71,6 +72,8 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     let [fused, exact] = [MultiplyAdd::Kept, MultiplyAdd::Called]
         .map(|multiply_add| exact::rewritten(&compiled, multiply_add));
     let (fused, exact) = (fused?, exact?);
+    let [fused_parts, exact_parts] = [&fused, &exact].map(|module| split::split(module, is_late));
+    let (fused_parts, exact_parts) = (fused_parts?, exact_parts?);
     let mut texts = BTreeMap::new();
     let listing = fs::read_dir(&source).map_err(of(&source))?;
     for path in listing.flatten().map(|entry| entry.path()) {
@@ -81,7 +84,11 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     let index = texts.entry(single::INDEX.into()).or_default();
     let closed = format!("{}{}", first_states(), single::END);
     *index = replaced(single::INDEX, index, single::END, &closed)?;
-    let whole = single::page(&texts, &fused, &exact)?;
+    let whole = single::page(
+        &texts,
+        &split::without_names(&fused)?,
+        &split::without_names(&exact)?,
+    )?;
     // Another version of any file is another version of the page, which browsers then load anew.
     let mut hash = Sha256::new();
     for text in texts.values() {
@@ -96,7 +103,12 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     *worker = replaced(WORKER, worker, VERSION, &version)?;
     *worker = replaced(WORKER, worker, FILES, &files)?;
     fs::create_dir_all(folder).map_err(of(folder))?;
-    let modules = [("nanotap.wasm", &fused), ("nanotap-exact.wasm", &exact)];
+    let modules = [
+        ("nanotap.wasm", &fused_parts.first),
+        ("nanotap-second.wasm", &fused_parts.second),
+        ("nanotap-exact.wasm", &exact_parts.first),
+        ("nanotap-exact-second.wasm", &exact_parts.second),
+    ];
     let texts = texts
         .iter()
         .map(|(name, text)| (name.as_str(), text.as_bytes()));
@@ -112,6 +124,39 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
         println!("{:>9} bytes  {}", bytes.len(), path.display());
     }
     Ok(())
+}
+
+/// Crates of which the first view needs nothing but the forms of their studies.
+const LATE: [&str; 8] = [
+    "afm_files",
+    "afm_thermal",
+    "nanotap_fit",
+    "nanotap_images",
+    "nanotap_proof",
+    "nanotap_reconstruct",
+    "nanotap_scan",
+    "nanotap_surveys",
+];
+/// What makes the forms of studies, by parts of names: schemas, and defaults as JSON.
+const FORMS: [&str; 3] = ["8schemars", "7request6schema", "3ser9Serialize"];
+/// Crates whose functions for one type may be the same instructions as those for another, and then are one.
+const SHARED: [&str; 3] = ["alloc", "core", "std"];
+
+/// Whether the page loads a function on demand, by its mangled name, in which each crate has its length before it.
+fn is_late(name: &str) -> bool {
+    let (name, _) = name.split_once('.').unwrap_or((name, ""));
+    let place = |one: &str| {
+        let part = format!("{}{one}", one.len());
+        // At the end stands where a function of other types was compiled, which others may call as well.
+        name.strip_suffix(&part).unwrap_or(name).find(&part)
+    };
+    let first = |crates: &[&str]| crates.iter().filter_map(|one| place(one)).min();
+    let Some(late) = first(&LATE) else {
+        return false;
+    };
+    // The function's own crate comes first, those of its types after it.
+    !FORMS.iter().any(|part| name.contains(part))
+        && first(&SHARED).is_none_or(|shared| late < shared)
 }
 
 /// What the page shows before its module is there: the states of its first example, with the case that they

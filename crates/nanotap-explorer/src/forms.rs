@@ -83,14 +83,15 @@ pub(crate) fn quality_factor(view: &Physical) -> f64 {
     of_loop.unwrap_or(view.lever.quality_factor)
 }
 
-/// A pulse that reaches the sample: it moves the tip by about twice the free amplitude.
+/// A pulse that reaches the sample: it moves the tip by about twice the free amplitude, and towards the
+/// sample first, since a lever with a low quality factor does not swing back as far.
 fn pulse(case: &Case) -> String {
     let Some(view) = case.physical() else {
-        return "pulse 0.3 times 10".to_owned();
+        return "pulse 0.3 times -10".to_owned();
     };
     let width = Kind::Time.format_digits(0.3 / case.get(Key::DriveFrequency), 1);
     let times = Kind::Number.format_digits(quality_factor(view).max(1.0), 2);
-    format!("pulse {width} times {times}")
+    format!("pulse {width} times -{times}")
 }
 
 /// The form of options with this schema.
@@ -463,4 +464,37 @@ fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {
         (_, None) => 1.0,
     };
     [value - reach, value + reach].map(|value| key.kind().format_digits(value, 5))
+}
+
+#[cfg(test)]
+mod tests {
+    use nanotap::control::Control;
+    use nanotap::study::drive_signal::StatedSignal;
+    use nanotap::study::one_shot::one_shot;
+    use nanotap::study::setpoint::at_setpoint;
+    use nanotap::study::simulate::SimulateOptions;
+
+    use super::*;
+    use crate::preset;
+
+    #[test]
+    fn the_pulse_of_every_lever_reaches_the_sample() {
+        let mut levers = 0;
+        for preset in preset::all(None).unwrap() {
+            let case = Case::parse(Some(preset.source()), &preset.set).unwrap();
+            if case.cantilever().is_none() {
+                continue;
+            }
+            let (case, _) = at_setpoint(case, &Control::default()).unwrap();
+            let options = SimulateOptions {
+                drive_signal: Some(StatedSignal::Text(pulse(&case))),
+                ..SimulateOptions::default()
+            };
+            let read = options.signal(&case).unwrap().unwrap();
+            let run = one_shot(&case, &read, &options, &Control::default()).unwrap();
+            assert!(run.contacts > 0, "{}", preset.name);
+            levers += 1;
+        }
+        assert_eq!(levers, 13);
+    }
 }

@@ -15,6 +15,8 @@ const POINTS = ["128", "256", "512", "1024"];
 const NONE = "\n";            // the choice of no lever
 const REST = 500;             // milliseconds after a change before the map is computed anew
 const LEVER = "cantilever.lever";
+// Columns of the table of levers that are shown, by their heads.
+const SHOWN = ["lever", "k", "f₀", "tip", "peak force", "regime", "states", "line time", "conditions"];
 const SAMPLE = "sample.material";
 let onChange = () => {};
 let refused = () => {};
@@ -343,17 +345,18 @@ function drawLevers() {
   else {
     const { heads, rows } = levers.table;
     const [first] = rows;
-    // The last column says whether the wishes are met; the best lever comes first.
-    const fits = first?.cells.at(-1) === "yes";
-    const words = fits ? t(first.cells[5].startsWith("0 ") ? "plan.leverTouchesNot" : "plan.leverDoes", { lever: first.cells[0], force: first.cells[5] }) : t("plan.leverNone");
+    const at = (name) => heads.findIndex(([head]) => head === name);
+    // The best lever comes first.
+    const [fits, force] = [first?.cells[at("conditions")] === "yes", first?.cells[at("peak force")]];
+    const words = fits ? t(force.startsWith("0 ") ? "plan.leverTouchesNot" : "plan.leverDoes", { lever: first.cells[at("lever")], force }) : t("plan.leverNone");
     parts.push(make("p", { id: "plan-lever-words", textContent: `${words} ${t("plan.leversTake")}` }), make("p", { className: "small", textContent: local(levers.words.split(". ")[0]) }));
     const titles = Object.values(t("plan.leverHeads"));
-    const columns = [0, 1, 2, 4, 5, 6, 7, 8, 9];
+    const columns = SHOWN.map(at);
     parts.push(make("div", { className: "wide" }, make("table", { className: "picks" },
       make("thead", {}, make("tr", {}, ...columns.map((column, k) => make("th", { scope: "col", textContent: titles[k] ?? heads[column][0], title: heads[column][1] })))),
       make("tbody", {}, ...rows.map(({ cells }) => {
         const row = make("tr", {}, ...columns.map((column, k) => make("td", {}, k ? local(cells[column]) : make("button", { type: "button", textContent: cells[column] }))));
-        row.addEventListener("click", () => choose(LEVER, cells[0]));
+        row.addEventListener("click", () => choose(LEVER, cells[at("lever")]));
         return row;
       })))));
   }

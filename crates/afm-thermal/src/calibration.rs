@@ -170,6 +170,7 @@ pub struct Scatter {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Sader {
     /// Static spring constant, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub stiffness: Estimate,
     /// Reynolds number ρωb²/(4η), of the method with plan dimensions.
     pub reynolds: Option<f64>,
@@ -181,6 +182,7 @@ pub struct Sader {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Calibration {
     /// Resonance frequency of the undamped first mode in its fluid, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: Estimate,
     /// Quality factor.
     pub quality: Estimate,
@@ -192,22 +194,28 @@ pub struct Calibration {
     pub unit: Unit,
     /// Static spring constant k of the lever, N/m, normal to the lever: by equipartition; by Sader's
     /// method for a spectrum in V without a sensitivity; `None` without either.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub stiffness: Option<Estimate>,
     /// Spring constant along the normal of the sample, k/cos² of the tilt (J. L. Hutter, Langmuir 21,
     /// 2630 (2005)), N/m; of a tilted lever.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub stiffness_along_normal: Option<Estimate>,
     /// Spring constant by Sader's method.
     pub sader: Option<Sader>,
     /// Sensitivity without contact, m/V, for which equipartition gives the k of Sader's method; of a
     /// spectrum in V.
+    #[schemars(extend("x-unit" = "m/V"))]
     pub sensitivity: Option<Estimate>,
     /// The factor k m/(k_B T).
     pub factor: ModeFactor,
     /// Temperature, K.
+    #[schemars(extend("x-unit" = "K"))]
     pub temperature: f64,
     /// Angle between lever and sample, rad.
+    #[schemars(extend("x-unit" = "rad"))]
     pub tilt: f64,
     /// Range of the fit, Hz.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub range: [f64; 2],
     /// Number of bins in the fit.
     pub bins: usize,

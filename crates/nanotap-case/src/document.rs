@@ -84,6 +84,7 @@ pub struct PhysicalSummary {
     pub quality_factor: f64,
     /// Mass of the beam, kg: of a lever whose modes were measured that of the uniform beam with its k
     /// and f0.
+    #[schemars(extend("x-unit" = "kg"))]
     pub beam_mass: f64,
     /// Measured modes of the lever, if it is not a beam.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -100,23 +101,28 @@ pub struct PhysicalSummary {
     #[schemars(extend("x-unit" = "m"))]
     pub free_amplitude: f64,
     /// Phase lag of the free deflection, degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub free_phase_degrees: f64,
     /// Quantity to which phases refer, such as "displacement of the clamped end".
     pub phase_reference: &'static str,
     /// Free amplitude of the second tone, m, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub second_free_amplitude: Option<f64>,
     /// Frequency of the second tone, Hz, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "Hz"))]
     pub second_frequency: Option<f64>,
     /// Amplitude of the second tone, m or N, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_amplitude: Option<f64>,
     /// Free amplitude of the third tone, m, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub third_free_amplitude: Option<f64>,
     /// Frequency of the third tone, Hz, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "Hz"))]
     pub third_frequency: Option<f64>,
     /// Amplitude of the third tone, m or N, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -127,6 +133,7 @@ pub struct PhysicalSummary {
     #[schemars(extend("x-unit" = "N/m"))]
     pub contact_stiffness: f64,
     /// Contact damping C₁ of the sample, N s/m.
+    #[schemars(extend("x-unit" = "N s/m"))]
     pub contact_damping: f64,
     /// Further quantities of the contact law by parameter, in SI.
     #[serde(flatten, serialize_with = "as_map")]
@@ -149,21 +156,26 @@ pub struct PhysicalSummary {
     pub force_table: Vec<(f64, f64)>,
     /// Gap of the tip, m; `None` while the distance is left to a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub tip_gap: Option<f64>,
     /// Gap of the beam, m; `None` while the distance is left to a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub beam_gap: Option<f64>,
     /// The model's unit of length, m; `None` while the distance is left to a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub length_unit: Option<f64>,
     /// The model's unit of time, s.
     #[schemars(extend("x-unit" = "s"))]
     pub time_unit: f64,
     /// The model's unit of force, N; `None` while the distance is left to a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "N"))]
     pub force_unit: Option<f64>,
     /// The model's unit of energy, J; `None` while the distance is left to a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "J"))]
     pub energy_unit: Option<f64>,
 }
 

@@ -79,8 +79,7 @@ fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
 /// Formats the table of tip, gap, contact and force.
 fn observables(o: &Observables, units: &Units, beam: bool) -> String {
     let shown = |kind, value, digits| number::quantity(units, kind, value, [digits, 4]);
-    let range =
-        |kind, [low, high]: [f64; 2]| format!("{} … {}", shown(kind, low, 6), shown(kind, high, 6));
+    let range = |kind, ends| number::range(units, kind, ends, [6, 4]);
     let mut table = Table::new([("", Align::Left); 3]);
     let words = |name: &str, what: &str, note: &str| [name, what, note].map(str::to_owned);
     let row = |name: &str, value, digits, kind, note: &str| {

@@ -4,7 +4,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::number::shortest;
-pub(crate) use nanotap::number::significant;
+pub(crate) use nanotap::number::{counted, significant};
 
 /// A number of the model with so many digits; where the case has SI, the quantity with so many.
 pub(crate) fn quantity(units: &Units, kind: Kind, value: f64, [model, si]: [usize; 2]) -> String {
@@ -13,6 +13,23 @@ pub(crate) fn quantity(units: &Units, kind: Kind, value: f64, [model, si]: [usiz
         (Some(unit), Kind::Energy) => format_electronvolts(unit * value),
         (Some(unit), _) => kind.format_digits(unit * value, si),
     }
+}
+
+/// Part of the larger end of a range below which the other end is its rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// Two ends of a range, each as [`quantity`]: an end that is rounding of the other is 0.
+pub(crate) fn range(units: &Units, kind: Kind, ends: [f64; 2], digits: [usize; 2]) -> String {
+    let size = ends[0].abs().max(ends[1].abs());
+    let resolved = |end: f64| {
+        if end.abs() < ROUNDING * size {
+            0.0
+        } else {
+            end
+        }
+    };
+    let [low, high] = ends.map(|end| quantity(units, kind, resolved(end), digits));
+    format!("{low} … {high}")
 }
 
 /// A number that was given, as short as it can be without changing it:
@@ -26,11 +43,6 @@ pub(crate) fn chosen(value: f64) -> String {
     } else {
         format!("{value}")
     }
-}
-
-/// `count` with the right form of its noun.
-pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// Numbers as a line of a CSV file, each in the shortest form that reads back.

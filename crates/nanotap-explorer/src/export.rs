@@ -6,6 +6,7 @@ use nanotap::case::Case;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::model::Model;
+use nanotap::number::shortest;
 use nanotap::observe::time_series;
 use serde::Deserialize;
 
@@ -79,9 +80,7 @@ fn csv(model: &Model, motion: &Motion, units: &Units) -> Result<String, ApiError
     let mut text = time_series::heads(model, units).join(",");
     text.push('\n');
     time_series::sample(model, motion.state(), motion.periods(), RESOLUTION, |row| {
-        let cells: Vec<String> = time_series::scaled(row, units)
-            .map(|number| number.to_string())
-            .collect();
+        let cells: Vec<String> = time_series::scaled(row, units).map(shortest).collect();
         text.push_str(&cells.join(","));
         text.push('\n');
     })

@@ -46,6 +46,7 @@ pub struct FileContents {
     #[schemars(extend("x-unit" = "N/m"))]
     pub spring_constant: Option<f64>,
     /// Sensitivity (InvOLS) of the first curve, m/V.
+    #[schemars(extend("x-unit" = "m/V"))]
     pub sensitivity: Option<f64>,
     /// Name of the channel that is the distance.
     pub distance: Option<String>,

@@ -235,6 +235,7 @@ pub struct BifurcationReport {
     pub criticality: Option<&'static str>,
     /// Angle of the multiplier pair at a Neimark–Sacker point, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "degree"))]
     pub angle: Option<f64>,
     /// Time of a grazing, in drive periods from the state.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -339,7 +339,7 @@ impl LyapunovReport {
     /// The section, with the names of the entries of a state.
     pub fn section_table(&self, names: Vec<String>, units: Units) -> Frame<'_> {
         frame! { Rows::new("section", &self.section, Some(units));
-            "phase_degrees", "", Digits(5) => |p| 360.0 * p.phase;
+            "phase_degrees", "", (Angle, Digits(5)) => |p| 360.0 * p.phase; .in_files((|number| number, ""));
             "tip", "", (Length, Digits(5)) => |p| p.tip;
             "tip_rate", "", (Velocity, Digits(5)) => |p| p.tip_rate;
             "gap_rate", "", (Velocity, Digits(5)) => |p| p.gap_rate;

@@ -28,10 +28,10 @@ use nanotap_model::model_map::ModelMap;
 use nanotap_model::recording::{NonlinearRecording, Recording};
 use nanotap_model::{MemoryReset, Model};
 use nanotap_observe::PhysicalMotion;
-use nanotap_observe::frame::{Frame, Rows, frame};
+use nanotap_observe::frame::{FileUnit, Frame, Rows, frame};
 use nanotap_observe::{
-    ContactEvent, Derivative, ObservableSet, Observables, OutOfRange, RecordOptions, Recorder,
-    Spectrum,
+    ContactEvent, Derivative, Dimension, ObservableSet, Observables, OutOfRange, RecordOptions,
+    Recorder, Spectrum,
 };
 use nanotap_study::Study;
 use nanotap_study::in_si::InSi;
@@ -103,17 +103,22 @@ pub fn harmonic_table(spectrum: &Spectrum, omega: f64, units: Units) -> Frame<'_
     if units == Units::Model {
         unknown.push("frequency");
     }
-    if spectrum.harmonics.iter().all(|h| h.slope.is_none()) {
+    let is_known = match &units {
+        Units::Model => true,
+        Units::Si(scales) => Dimension::Slope.si(scales).is_some(),
+    };
+    if !is_known || spectrum.harmonics.iter().all(|h| h.slope.is_none()) {
         unknown.push("slope");
     }
+    let bare: FileUnit = (|number| number, "");
     frame! { Rows::new("harmonics", &spectrum.harmonics, Some(units));
         "order", "order", Digits(5) => |h| h.order;
         "frequency", "frequency", (Frequency, Digits(5)) => move |h| h.order * omega;
         "tip", "tip", (Length, Digits(5)) => |h| h.tip;
-        "tip_lag_degrees", "lag", Digits(5) => |h| h.tip_phase;
+        "tip_lag_degrees", "lag", (Angle, Digits(5)) => |h| h.tip_phase; .in_files(bare);
         "force", "force", (Force, Digits(5)) => |h| h.force;
-        "force_lag_degrees", "lag", Digits(5) => |h| h.force_phase;
-        "slope", "slope", Digits(5) => |h| h.slope;
+        "force_lag_degrees", "lag", (Angle, Digits(5)) => |h| h.force_phase; .in_files(bare);
+        "slope", "slope", (Slope, Digits(5)) => |h| h.slope; .in_files(bare);
         .without(&unknown);
     }
 }

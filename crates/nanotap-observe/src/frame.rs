@@ -409,6 +409,16 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// Unit of the numbers of a column, as JSON schemas declare it; empty of a pure number.
+    pub fn declared_unit(&self, dimension: Dimension) -> &'static str {
+        let unit = if self.is_si() {
+            dimension.si_unit()
+        } else {
+            dimension.model_unit()
+        };
+        if unit == "1" { "" } else { unit }
+    }
+
     /// The name of a column, among quantities in SI or in the model's units.
     pub fn name<'c>(&self, column: &'c Column<'_>) -> &'c str {
         if self.is_si() {

@@ -38,6 +38,7 @@ pub struct Setting {
     /// Quantity to which phases refer, in words: a displacement or a force.
     pub phase_reference: &'static str,
     /// Drive frequency, Hz; of several tones, that of the first.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub frequency: f64,
     /// If Hertz's stiffness was linearised at an indentation that this motion does not have.
     #[serde(skip_serializing_if = "Option::is_none")]

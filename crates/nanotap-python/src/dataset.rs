@@ -56,8 +56,8 @@ impl Recipe {
         let mut request = json(request)?;
         let file = request.as_object_mut().and_then(|all| all.remove("file"));
         let file = file.and_then(|file| file.as_str().map(PathBuf::from));
-        let solves = (entry.solves_distance)(&request).map_err(Failure::from)?;
-        let case = case.studied_unless(solves, py)?;
+        let any_distance = (entry.any_distance)(&request).map_err(Failure::from)?;
+        let case = case.studied_unless(any_distance, py)?;
         let done = watched(py, progress, move |control| {
             Ok(install(threads, || match &file {
                 Some(path) => {

@@ -18,7 +18,7 @@ use nanotap::observe::{Dimension, OBSERVABLES};
 use nanotap::study::in_si::InSi;
 use nanotap::study::modes::{ModesOptions, ModesStudy, shape_table};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
-use nanotap::study::registry::{Answer, Document, Study as _};
+use nanotap::study::registry::{Answer, Answered, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::setpoint::at_setpoint;
 use nanotap::study::simulate::{SimulateOptions, SimulateReport, SimulateStudy};
@@ -34,7 +34,7 @@ use crate::case::CaseCore;
 use crate::columns::{Column, Entries, columns, entries};
 use crate::document::{document, python};
 use crate::failure::Failure;
-use crate::study::{Kept, ReportCore, json};
+use crate::study::{ReportCore, json};
 use crate::watch::{watched, watched_alone};
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -49,7 +49,7 @@ fn table(py: Python<'_>, names: Vec<String>, values: Vec<f64>) -> PyResult<Table
 
 /// Frequencies and mode shapes of a case: first the shapes at points along the beam.
 struct ModesAnswer {
-    kept: Kept<ModesStudy>,
+    kept: Answered<ModesStudy>,
     beam: Modes,
     points: usize,
 }
@@ -93,7 +93,7 @@ pub(crate) fn modes<'py>(
         .flat_map(|&xi| beam.shapes(xi).as_slice().to_vec())
         .collect();
     let shapes = PyArray1::from_vec(py, shapes).reshape([points, width])?;
-    let kept = Kept { case, report };
+    let kept = Answered { case, report };
     let answer = ModesAnswer { kept, beam, points };
     Ok((ReportCore::new(answer), PyArray1::from_vec(py, xi), shapes))
 }
@@ -176,11 +176,13 @@ impl Answer for MotionAnswer {
     fn frames(&self) -> Vec<Frame<'_>> {
         let series = self.series().ok();
         let series = series.map(|(model, rows)| series_table(&model, rows, self.case.units()));
-        let harmonics = match &self.report {
+        let further = match &self.report {
             MotionReport::Orbit(orbit) => OrbitStudy::frames(&self.case, orbit),
-            MotionReport::Run(_) => Vec::new(),
+            // Its table is the curve, which is the series.
+            MotionReport::Run(SimulateReport::FixedStep(_)) => Vec::new(),
+            MotionReport::Run(run) => SimulateStudy::frames(&self.case, run),
         };
-        series.into_iter().chain(harmonics).collect()
+        series.into_iter().chain(further).collect()
     }
 
     fn figure(&self) -> Option<Figure> {

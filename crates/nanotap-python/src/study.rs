@@ -2,19 +2,20 @@
 
 use std::collections::HashSet;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use nanotap::Error;
 use nanotap::case::Case;
 use nanotap::case::physical::Catalogue;
 use nanotap::frame::{Cell, Column, Frame};
-use nanotap::study::calibrate::{CalibrateOptions, calibrate_file, calibrate_table};
+use nanotap::study::calibrate::{
+    CalibrateOptions, CalibrateReport, calibrate_file, calibrate_table,
+};
 use nanotap::study::fit::{FitOptions, Table, implied_words};
 use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
-use nanotap::study::registry::{self, Answer, Document, Study, StudyEntry};
-use nanotap::study::request::read;
+use nanotap::study::registry::{self, Answer, Answered, Study as _, StudyEntry};
+use nanotap::study::request::{answer_schema, read};
 use nanotap::study::threads::install;
-use nanotap_figures::Figure;
 use nanotap_paper::{Options as PaperOptions, report_so_far, section_names};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -96,7 +97,7 @@ pub(crate) fn table_of(frame: &Frame<'_>) -> Value {
         json!({
             "name": frame.name(column),
             "label": column.label,
-            "unit": frame.unit(column.dimension),
+            "unit": frame.declared_unit(column.dimension),
             "values": (0..frame.rows).map(value).collect::<Vec<Value>>(),
         })
     };
@@ -106,27 +107,6 @@ pub(crate) fn table_of(frame: &Frame<'_>) -> Value {
     let once = named.filter(|c| names.insert(frame.name(c)));
     let columns: Vec<Value> = once.map(column).collect();
     json!({ "name": frame.name, "columns": columns })
-}
-
-/// The report of a study on a case, for studies that Python asks more of than their document.
-pub(crate) struct Kept<S: Study> {
-    pub(crate) case: Arc<Case>,
-    pub(crate) report: S::Report,
-}
-
-impl<S: Study> Answer for Kept<S> {
-    fn document(&self) -> Result<String, Error> {
-        let document = Document::of::<S>(&self.report, &self.case);
-        Ok(serde_json::to_string(&document)?)
-    }
-
-    fn frames(&self) -> Vec<Frame<'_>> {
-        S::frames(&self.case, &self.report)
-    }
-
-    fn figure(&self) -> Option<Figure> {
-        S::figure(&self.case, &self.report)
-    }
 }
 
 /// A study: from the JSON of its request to its report, and whether Ctrl-C stopped it.
@@ -142,7 +122,8 @@ pub(crate) fn study(
 ) -> PyResult<(ReportCore, bool)> {
     let entry = entry(name)?;
     let request = json(request)?;
-    let case = case.studied_unless(entry.any_distance, py)?;
+    let any_distance = (entry.any_distance)(&request).map_err(Failure::from)?;
+    let case = case.studied_unless(any_distance, py)?;
     let done = watched(py, progress, move |control| {
         Ok(install(threads, || entry.answer(&case, request, control))??)
     })?;
@@ -165,39 +146,38 @@ pub(crate) fn studies() -> Vec<(&'static str, &'static str, &'static str, String
     registry::STUDIES.iter().map(row).collect()
 }
 
+/// The calibration, which has no case and so is none of the studies.
+const CALIBRATE: &str = "calibrate";
+
 /// The JSON schema of a study's report, in which columns have `x-unit` and `x-label`.
 #[pyfunction]
 pub(crate) fn report_schema(name: &str) -> PyResult<String> {
-    Ok((entry(name)?.report)().as_value().to_string())
+    let schema = if name == CALIBRATE {
+        answer_schema::<CalibrateReport>()
+    } else {
+        (entry(name)?.report)()
+    };
+    Ok(schema.as_value().to_string())
 }
 
-/// Calibrates a lever from a file or from the JSON of a table: the document, and the JSON of its table,
-/// its CSV file and its figure.
+/// Calibrates a lever from a file or from the JSON of a table.
 #[pyfunction]
 pub(crate) fn calibrate(
     py: Python<'_>,
     path: Option<PathBuf>,
     table: Option<String>,
     request: &str,
-) -> PyResult<(String, String)> {
+) -> PyResult<ReportCore> {
     let options: CalibrateOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched(py, None, move |_| {
-        let report = match (path, table) {
-            (Some(path), _) => calibrate_file(&path, &options)?,
-            (None, table) => {
-                let table: Table = serde_json::from_str(&table.unwrap_or_default())?;
-                calibrate_table(&table, &options)?
-            }
-        };
-        let table = report.spectrum_table();
-        let shown = json!({
-            "tables": { "spectrum": table_of(&table)["columns"] },
-            "csv": table.csv(),
-            "figure": report.figure().to_json()?,
-        });
-        Ok((serde_json::to_string(&report)?, shown.to_string()))
+        Ok(if let Some(path) = path {
+            calibrate_file(&path, &options)?
+        } else {
+            let table: Table = serde_json::from_str(&table.unwrap_or_default())?;
+            calibrate_table(&table, &options)?
+        })
     })?;
-    Ok(done.result)
+    Ok(ReportCore::new(done.result))
 }
 
 /// A table of measured values from a CSV file or an instrument's file, of which the first curve or the
@@ -252,7 +232,7 @@ pub(crate) fn lyapunov<'py>(
         let width = 4 + report.section.first().map_or(0, |p| p.state.len());
         let rows: Vec<f64> = rows.collect();
         let case = studied;
-        Ok((Kept::<LyapunovStudy> { case, report }, rows, width))
+        Ok((Answered::<LyapunovStudy> { case, report }, rows, width))
     })?;
     let (kept, values, width) = done.result;
     let shape = [values.len() / width, width];

@@ -10,6 +10,11 @@ pub fn shortest(value: f64) -> String {
     (value + 0.0).to_string()
 }
 
+/// `count` with the right form of its noun.
+pub fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 /// `value` with `digits` significant digits: `0.1447`, `20.34`, `3.113e-8`.
 ///
 /// Plain where that is short, with an exponent where zeros would have to be

@@ -116,11 +116,16 @@ pub trait DatasetStudy {
     /// Options: what front ends show, check and pass on as JSON.
     type Options: Serialize + DeserializeOwned + JsonSchema;
     /// Summary of the finished dataset.
-    type Report: Serialize + JsonSchema;
+    type Report: Serialize + JsonSchema + Send;
 
-    /// Whether the options solve for distances, so that none is solved for a setpoint of the case.
-    fn solves_distance(_: &Self::Options) -> bool {
+    /// Whether the study chooses distances itself under these options, so that none is solved for a setpoint.
+    fn any_distance(_: &Self::Options) -> bool {
         false
+    }
+
+    /// The tables of a summary, as front ends show them; without any, its fields.
+    fn frames(_: &Self::Report) -> Vec<Frame<'_>> {
+        Vec::new()
     }
 
     /// Plans the dataset of a `case` that `control` cancels: implements [`plan`](Self::plan).

@@ -36,6 +36,7 @@ pub struct ReadingDifference {
     /// Difference of the amplitude A, as a fraction of A with the most modes.
     pub first_harmonic: f64,
     /// Difference of the phase, degrees in 0 … 180.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase: f64,
     /// Difference of the dissipated energy E_dis, as a fraction of E_dis with the most modes.
     pub dissipation: f64,

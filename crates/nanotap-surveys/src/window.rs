@@ -443,7 +443,7 @@ impl DatasetStudy for WindowStudy {
     type Options = WindowOptions;
     type Report = Window;
 
-    fn solves_distance(_: &WindowOptions) -> bool {
+    fn any_distance(_: &WindowOptions) -> bool {
         true
     }
 

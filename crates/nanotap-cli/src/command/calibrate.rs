@@ -10,7 +10,7 @@ use crate::arguments::{OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::request::Request;
-use crate::text_table::{Align, Table};
+use crate::text_table::Table;
 use crate::{motion, number, style};
 
 /// Calibrate a lever from its thermal noise: k, Q, f0, sensitivity.
@@ -51,7 +51,8 @@ fn text(report: &CalibrateReport) -> String {
         "{}: thermal calibration of `{}`",
         report.source, report.name
     );
-    let mut text = format!("{}\n\n{}\n", style::bold(&heading), table(report).render());
+    let estimates = Table::all(&report.estimate_table()).render();
+    let mut text = format!("{}\n\n{estimates}\n", style::bold(&heading));
     let mut say = |words: String| text.push_str(&motion::paragraph(&words));
     say(factors(calibration));
     say(format!(
@@ -71,20 +72,6 @@ fn text(report: &CalibrateReport) -> String {
     ));
     text.push('\n');
     text + &report.cantilever
-}
-
-/// The estimates with their 95 % intervals.
-fn table(report: &CalibrateReport) -> Table {
-    let mut table = Table::new([
-        ("", Align::Left),
-        ("estimate", Align::Left),
-        ("error", Align::Right),
-        ("95 % interval", Align::Left),
-    ]);
-    for row in report.estimates() {
-        table.row(row);
-    }
-    table
 }
 
 /// How k follows from the mean square.

@@ -1,17 +1,15 @@
 //! `nanotap fit`: parameters of lever and sample from measured curves.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nanotap::case::physical::Kind;
 use nanotap::dataset::Share;
 use nanotap::figure::fit::{FitMaps, fit_figure};
 use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::fit::{
-    Estimate, FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve,
-    RivalParameter,
+    FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve, RivalParameter,
+    force_curve_table,
 };
 use serde::Serialize;
 
@@ -21,7 +19,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
-use crate::text_table::{Align, Table};
+use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
@@ -233,99 +231,9 @@ fn laws(report: &FitReport) -> String {
     text
 }
 
-/// A value with its standard error, in so many digits that the error has two.
-fn plus_minus(kind: Kind, value: f64, error: Option<f64>) -> String {
-    let Some(error) = error.filter(|error| *error > 0.0) else {
-        return kind.format_digits(value, 5);
-    };
-    let digits = nanotap_arithmetic::log10(value.abs() / error).ceil() + 2.0;
-    let value = kind.format_digits(value, digits.clamp(3.0, 12.0) as usize);
-    format!("{value} ± {}", kind.format_digits(error, 2))
-}
-
 /// What a fit of a force curve says of sample and contact.
 fn force_curve(of: &FittedForceCurve) -> String {
-    let mut table = Table::new([("", Align::Left), ("", Align::Left)]);
-    let estimate = |kind: Kind, found: &Estimate| {
-        let ends = found
-            .interval
-            .map(|end| end.map(|end| kind.format_digits(end, 4)));
-        let interval = match ends {
-            [Some(low), Some(high)] => format!(" (95 %: {low} to {high})"),
-            _ => String::new(),
-        };
-        plus_minus(kind, found.value, found.standard_error) + &interval
-    };
-    if let Some(modulus) = &of.modulus {
-        table.row(["Young's modulus", &estimate(Kind::Pressure, modulus)]);
-    }
-    if let Some(contact) = &of.contact_point {
-        let place = plus_minus(Kind::Length, contact.value, contact.standard_error);
-        table.row(["contact point", &format!("{place} on `{}`", of.distance)]);
-    }
-    if let Some(baseline) = &of.baseline {
-        let kind = Kind::of_si_unit(&of.baseline_unit).unwrap_or(Kind::Number);
-        let value = plus_minus(kind, baseline.value, baseline.standard_error);
-        table.row(["baseline", &format!("{value} of `{}`", of.deflection)]);
-    }
-    if let Some(force) = of.adhesion_force {
-        table.row([
-            "adhesion",
-            &format!(
-                "{}, the pull-off force",
-                Kind::Force.format_digits(-force, 4)
-            ),
-        ]);
-    }
-    let sizes = [
-        ("tip radius", Kind::Length, of.tip_radius),
-        ("half angle", Kind::Angle, of.half_angle),
-        ("Poisson's ratio", Kind::Number, of.poisson),
-    ];
-    let sizes = sizes.into_iter().filter_map(|(name, kind, value)| {
-        Some(format!("{name} {}", kind.format_digits(value?, 5)))
-    });
-    let law = of.law.as_deref().unwrap_or("linear contact").to_owned();
-    let model: Vec<String> = std::iter::once(law).chain(sizes).collect();
-    table.row(["law", &model.join(", ")]);
-    let segment = of.segment.as_deref().unwrap_or("all");
-    let rows = number::counted(of.rows, "row", "rows");
-    table.row([
-        "fitted",
-        &format!(
-            "{segment}, {rows}: `{}` against `{}`",
-            of.deflection, of.distance
-        ),
-    ]);
-    let from = match of.spring_constant_from.as_str() {
-        "header" => "from the file's header",
-        _ => "stated",
-    };
-    let k = Kind::Stiffness.format_digits(of.spring_constant, 5);
-    let sensitivity = of.sensitivity_in_header.map_or_else(String::new, |of| {
-        format!(
-            "; InvOLS {} nm/V in the header",
-            number::significant(1e9 * of, 4)
-        )
-    });
-    table.row(["lever", &format!("k = {k} {from}{sensitivity}")]);
-    table.row([
-        "up to",
-        &format!(
-            "{} at an indentation of {}",
-            Kind::Force.format_digits(of.largest_force, 4),
-            Kind::Length.format_digits(of.largest_indentation, 4)
-        ),
-    ]);
-    table.row([
-        "misfit",
-        &format!(
-            "{} (root mean square), {} % of the largest force",
-            Kind::Force.format_digits(of.residual_force, 3),
-            number::significant(100.0 * of.residual_force / of.largest_force, 2)
-        ),
-    ]);
-    let mut text = table.render();
+    let mut text = Table::all(&force_curve_table(std::slice::from_ref(of))).render();
     text.push('\n');
     for caution in &of.cautions {
         text.push_str(&motion::paragraph(&format!("be careful: {caution}")));
@@ -353,9 +261,6 @@ fn text(case: &GivenCase, report: &FitReport) -> String {
         text.push_str(&laws(report));
     }
     for of in &report.force_curves {
-        if report.force_curves.len() > 1 {
-            let _ = writeln!(text, "{}", style::bold(&of.curve));
-        }
         text.push_str(&force_curve(of));
     }
     text.push_str(&Table::all(&report.parameter_table()).render());

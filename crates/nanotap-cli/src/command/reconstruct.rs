@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use nanotap::case::physical::Kind;
-use nanotap::case::quantity::format_electronvolts;
 use nanotap::study::reconstruct::{ReconstructMethod, ReconstructReport, ReconstructStudy};
 
 use crate::arguments::measured;
@@ -14,7 +12,7 @@ use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::text_table::Table;
 use crate::threads::ThreadsArgument;
-use crate::{motion, number, progress, style};
+use crate::{number, progress, style};
 
 /// Rows of the printed force curve.
 const SHOWN: usize = 15;
@@ -50,18 +48,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 fn text(case: &GivenCase, report: &ReconstructReport) -> String {
-    let shown = |kind: Kind, value: f64, digits: usize| {
-        if report.physical {
-            kind.format_digits(value, digits)
-        } else {
-            number::significant(value, digits)
-        }
-    };
-    let energy = |value: Option<f64>| match value {
-        None => String::new(),
-        Some(value) if report.physical => format_electronvolts(value),
-        Some(value) => number::significant(value, 4),
-    };
     let method = match report.method {
         ReconstructMethod::AmplitudeModulation => "amplitude and phase",
         ReconstructMethod::FrequencyModulation => "frequency shift",
@@ -75,45 +61,7 @@ fn text(case: &GivenCase, report: &ReconstructReport) -> String {
     let rows = (0..end).step_by(end.div_ceil(SHOWN).max(1));
     let table = Table::of(&report.force_table(), rows);
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
-    let mut say = |words: String| text.push_str(&motion::paragraph(&words));
-    if let Some(minimum) = &report.minimum {
-        say(format!(
-            "minimum of the force: {} ± {} at {}",
-            shown(Kind::Force, minimum.force, 4),
-            shown(Kind::Force, minimum.force_error, 2),
-            shown(Kind::Length, minimum.distance, 4)
-        ));
-    }
-    say(format!(
-        "closest approach: {}; largest dissipation: {}",
-        shown(Kind::Length, report.closest, 4),
-        if report.has_damping {
-            let largest = report.rows.iter().filter_map(|row| row.dissipation);
-            energy(Some(largest.fold(0.0, f64::max)))
-        } else {
-            let measured = report.table.dissipation.iter().any(Option::is_some);
-            if measured {
-                "not determined"
-            } else {
-                "not measured"
-            }
-            .to_owned()
-        }
-    ));
-    let source = match (report.method, report.free_rows) {
-        (ReconstructMethod::FrequencyModulation, _) => "held".to_owned(),
-        (_, 0) => "given".to_owned(),
-        (_, rows) => format!("from {}", number::counted(rows, "row", "rows")),
-    };
-    say(format!(
-        "free amplitude {}, phase {}° ({source})",
-        shown(Kind::Length, report.free_amplitude, 5),
-        number::significant(report.free_phase, 5)
-    ));
-    say(format!(
-        "mean squared residual {} in standard errors; effective parameters {}",
-        number::significant(report.chi2, 3),
-        number::significant(report.freedom, 3)
-    ));
+    text.push('\n');
+    text.push_str(&Table::all(&report.summary_table()).render());
     text
 }

@@ -148,17 +148,13 @@ fn one_shot_text(case: &GivenCase, run: &OneShot) -> String {
     let mut row = |what: &str, value: String, note: &str| {
         table.row([what.to_owned(), value, note.to_owned()]);
     };
-    let range = |kind, low, high| format!("{} … {}", shown(kind, low, 6), shown(kind, high, 6));
+    let range = |kind, ends| number::range(&units, kind, ends, [6, 4]);
     row(
         "tip deflection W",
-        range(Kind::Length, seen.tip_min, seen.tip_max),
+        range(Kind::Length, [seen.tip_min, seen.tip_max]),
         "",
     );
-    row(
-        "gap",
-        range(Kind::Length, seen.gap_range[0], seen.gap_range[1]),
-        "",
-    );
+    row("gap", range(Kind::Length, seen.gap_range), "");
     if let Some((first, last)) = run.first_contact.zip(run.last_contact) {
         let times = format!(
             "at {} to {} drive periods from the beginning of the signal",
@@ -183,7 +179,7 @@ fn one_shot_text(case: &GivenCase, run: &OneShot) -> String {
     }
     row(
         "force on the tip",
-        range(Kind::Force, seen.least_force, seen.peak_force),
+        range(Kind::Force, [seen.least_force, seen.peak_force]),
         "negative where the sample attracts",
     );
     let energies = [

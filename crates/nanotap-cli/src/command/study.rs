@@ -68,8 +68,9 @@ fn command_of(entry: &StudyEntry) -> Command {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let entry = arguments.entry;
-    let case = GivenCase::for_study(&arguments.case, entry.any_distance, output)?;
     let request = Value::Object(arguments.given.clone());
+    let any_distance = (entry.any_distance)(&request)?;
+    let case = GivenCase::for_study(&arguments.case, any_distance, output)?;
     let document = progress::watched(entry.name, entry.counted, entry.partial, |control| {
         entry.document(&case, request, control)
     })?;

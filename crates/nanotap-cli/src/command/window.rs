@@ -42,7 +42,7 @@ const SHOWN_POINTS: usize = 36;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let options = arguments.request.read()?;
     let names = options.over.names();
-    let any_distance = WindowStudy::solves_distance(&options);
+    let any_distance = WindowStudy::any_distance(&options);
     let implied = options.over.first_values();
     let case = GivenCase::with_implied(&arguments.case, &implied, any_distance, output)?;
     let over = options.over.parse(&case)?;

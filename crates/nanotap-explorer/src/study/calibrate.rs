@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
-use nanotap::study::calibrate::{CalibrateOptions, CalibrateReport, calibrate_bytes};
+use nanotap::study::calibrate::{CalibrateOptions, calibrate_bytes};
 use nanotap::study::request::{read, schema};
 use serde_json::{Map, Value};
 
@@ -47,7 +47,7 @@ impl Studied<'_> {
         self.hand(Stage {
             figure: Some(found.figure()),
             words,
-            tables: vec![estimates(&found)],
+            tables: vec![report::of_frame("", &found.estimate_table())],
             commands: Some(commands(name, &named)),
             form: Some(CALIBRATE),
             found: Some(NextStep {
@@ -88,20 +88,6 @@ impl Studied<'_> {
         let taken = spec.any_distance(self.app).ok()?;
         taken.model().is_ok().then_some(set)
     }
-}
-
-/// The estimates with their relative standard errors and 95 % intervals.
-fn estimates(found: &CalibrateReport) -> Value {
-    let rows: Vec<Value> = (found.estimates().iter())
-        .map(|cells| report::row(cells, None))
-        .collect();
-    let heads = [
-        ("", ""),
-        ("value", ""),
-        ("±", "relative standard error"),
-        ("95 % range", ""),
-    ];
-    report::table("", &heads, &rows)
 }
 
 /// The command and the lines of Python of a calibration.

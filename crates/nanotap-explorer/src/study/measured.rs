@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use nanotap::case::file::Source;
 use nanotap::case::force_table::ForceTable;
-use nanotap::case::quantity::{Kind, format_electronvolts};
+use nanotap::case::quantity::Kind;
 use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
@@ -13,7 +13,7 @@ use nanotap::figure::reconstruct::reconstruct_figure;
 use nanotap::files;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::approach::ApproachStudy;
-use nanotap::study::fit::{FitMap, FitOptions, FitStudy, Table, measured};
+use nanotap::study::fit::{FitMap, FitOptions, FitStudy, Table, force_curve_table, measured};
 use nanotap::study::image_states::ImageData;
 use nanotap::study::reconstruct::{
     ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
@@ -131,11 +131,17 @@ impl Studied<'_> {
         } else {
             "The model does not describe the data."
         };
+        let shown = [
+            force_curve_table(&report.force_curves),
+            report.parameter_table(),
+        ];
+        let filled = shown.iter().filter(|table| table.rows > 0);
+        let tables = filled.map(|table| report::of_frame("", table)).collect();
         self.hand(Stage {
             figure: Some(fit_figure(&report)),
             words: format!("{fits} {}", notes.join(". ")).trim_end().to_owned(),
             studies: &[("fit", &named)],
-            tables: vec![report::of_frame("", &report.parameter_table())],
+            tables,
             found: Some(found),
             ..Stage::default()
         })
@@ -151,13 +157,15 @@ impl Studied<'_> {
         let entry = study_named(FitStudy::NAME)
             .ok_or_else(|| ApiError::failed("this program has no fit"))?;
         let plan = |control: &Control<'_>| FitMap::prepare(case, request, control);
-        let (summary, figure) = self.whole_dataset(entry, plan)?;
+        let map = self.whole_dataset(entry, plan)?;
         named.insert("out".into(), "fit.zarr".into());
         self.hand(Stage {
-            figure,
+            figure: map.figure(),
             words: "One fit a pixel.".to_owned(),
             studies: &[(FitStudy::NAME, &named)],
-            tables: report::tables(&summary, &Value::Null),
+            tables: (map.frames().iter())
+                .map(|frame| report::of_frame("", frame))
+                .collect(),
             ..Stage::default()
         })
     }
@@ -193,7 +201,7 @@ impl Studied<'_> {
             figure: Some(reconstruct_figure(&report)),
             words,
             studies: &[(ReconstructStudy::NAME, named)],
-            tables: vec![force_values(&report)],
+            tables: vec![report::of_frame("", &report.summary_table())],
             found: Some(NextStep {
                 set,
                 take: "Use as the sample's force table",
@@ -312,62 +320,4 @@ impl Studied<'_> {
             ..Stage::default()
         })
     }
-}
-
-/// The values of a reconstruction.
-fn force_values(report: &ReconstructReport) -> Value {
-    let shown = |kind: Kind, value: f64, digits: usize| {
-        let kind = if report.physical { kind } else { Kind::Number };
-        kind.format_digits(value, digits)
-    };
-    let energy = |value: f64| {
-        if report.physical {
-            format_electronvolts(value)
-        } else {
-            Kind::Number.format_digits(value, 4)
-        }
-    };
-    let mut values = Vec::new();
-    if let Some(minimum) = &report.minimum {
-        let [force, error] = [(minimum.force, 4), (minimum.force_error, 2)]
-            .map(|(value, digits)| shown(Kind::Force, value, digits));
-        let at = shown(Kind::Length, minimum.distance, 4);
-        values.push([
-            "minimum of the force".to_owned(),
-            format!("{force} ± {error} at {at}"),
-        ]);
-    }
-    let dissipated = report.rows.iter().filter_map(|row| row.dissipation);
-    let dissipated = dissipated.reduce(f64::max);
-    values.extend([
-        [
-            "closest approach".to_owned(),
-            shown(Kind::Length, report.closest, 4),
-        ],
-        [
-            "largest dissipation".to_owned(),
-            match dissipated {
-                None => "not measured".to_owned(),
-                Some(_) if !report.has_damping => "not determined".to_owned(),
-                Some(energies) => energy(energies),
-            },
-        ],
-        [
-            "free amplitude and phase".to_owned(),
-            format!(
-                "{}, {}°",
-                shown(Kind::Length, report.free_amplitude, 5),
-                Kind::Number.format_digits(report.free_phase, 5)
-            ),
-        ],
-        [
-            "mean squared residual, in standard errors".to_owned(),
-            Kind::Number.format_digits(report.chi2, 3),
-        ],
-    ]);
-    let rows: Vec<Value> = values
-        .iter()
-        .map(|cells| report::row(cells, None))
-        .collect();
-    report::table("", &[("", ""), ("", "")], &rows)
 }

@@ -3,9 +3,8 @@
 use nanotap::Error;
 use nanotap::control::Control;
 use nanotap::study::Study as _;
-use nanotap::study::registry::{DatasetPlan, StudyEntry, study as study_named};
+use nanotap::study::registry::{Answer, DatasetPlan, StudyEntry, study as study_named};
 use nanotap::study::simulate::SimulateStudy;
-use nanotap_figures::Figure;
 use serde_json::Value;
 
 use super::{Stage, Studied, dataset};
@@ -34,26 +33,24 @@ impl Studied<'_> {
         let request = Value::Object(options.clone());
         self.begins(entry.name, &options);
         let schema = (entry.report)();
-        let (figure, tables) = if entry.answer.is_some() {
-            let answer = self.counting(entry.counted, |control| {
+        let answer = if entry.answer.is_some() {
+            self.counting(entry.counted, |control| {
                 entry.answer(&case, request, control)
-            })?;
-            let document: Value = serde_json::from_str(&answer.document()?).map_err(Error::from)?;
-            let frames = answer.frames();
-            let mut tables = report::tables(&document, schema.as_value());
-            if !frames.is_empty() {
-                tables.truncate(1);
-                let filled = frames.iter().filter(|frame| frame.rows > 0);
-                tables.extend(filled.map(|frame| report::of_frame(frame.name, frame)));
-            }
-            (answer.figure(), tables)
+            })?
         } else {
             let plan = |control: &Control<'_>| entry.plan(&case, request, control);
-            let (summary, figure) = self.whole_dataset(entry, plan)?;
-            (figure, report::tables(&summary, schema.as_value()))
+            self.whole_dataset(entry, plan)?
         };
+        let document: Value = serde_json::from_str(&answer.document()?).map_err(Error::from)?;
+        let frames = answer.frames();
+        let mut tables = report::tables(&document, schema.as_value());
+        if !frames.is_empty() {
+            tables.truncate(1);
+            let filled = frames.iter().filter(|frame| frame.rows > 0);
+            tables.extend(filled.map(|frame| report::of_frame(frame.name, frame)));
+        }
         self.hand(Stage {
-            figure,
+            figure: answer.figure(),
             words: entry.about.to_owned(),
             studies: &[(name, &options)],
             tables,
@@ -61,19 +58,16 @@ impl Studied<'_> {
         })
     }
 
-    /// The summary and the figure of a study's dataset.
+    /// The summary of a study's dataset.
     pub(super) fn whole_dataset(
         &self,
         entry: &StudyEntry,
         plan: impl FnOnce(&Control<'_>) -> Result<DatasetPlan, Error>,
-    ) -> Result<(Value, Option<Figure>), ApiError> {
+    ) -> Result<Box<dyn Answer>, ApiError> {
+        let summarise = (entry.summary)
+            .ok_or_else(|| ApiError::failed(format!("{} leaves no dataset", entry.name)))?;
         self.counting(entry.counted, |control| {
-            dataset(&plan(control)?, control, |store| {
-                let summary = entry.summary.map(|of| of(store)).transpose()?;
-                Ok(summary.map_or_else(Default::default, |(summary, figure)| {
-                    (summary, Some(figure))
-                }))
-            })
+            dataset(&plan(control)?, control, |store| Ok(summarise(store)?))
         })
     }
 }

@@ -32,7 +32,7 @@ use crate::figure::calibrate::calibrate_figure;
 use source::{CELSIUS, Measurement, Signal, Stated};
 
 /// Sensitivity of the optical lever, m/V.
-const SENSITIVITY: Kind = Kind::new(&KindEntry {
+pub(crate) const SENSITIVITY: Kind = Kind::new(&KindEntry {
     name: "sensitivity",
     dimension: Dimension::new(-1, -1, 2).charged(1),
     si_unit: "m/V",
@@ -225,56 +225,91 @@ pub fn calibrate_file(path: &Path, options: &CalibrateOptions) -> Result<Calibra
 }
 
 impl CalibrateReport {
-    /// Returns the estimates as text, one a row: name, value, relative standard error, 95 % interval.
-    pub fn estimates(&self) -> Vec<[String; 4]> {
+    /// The tables: the spectrum, which files contain, and the estimates.
+    pub fn tables(&self) -> Vec<Frame<'_>> {
+        vec![self.spectrum_table(), self.estimate_table()]
+    }
+
+    /// The estimates with their relative standard errors and 95 % intervals, each in its own unit.
+    pub fn estimate_table(&self) -> Frame<'static> {
+        frame! { Rows::new("estimates", self.estimates(), None);
+            "quantity", "", Plain => |row| row.name;
+            "", "estimate", Plain => |row| (row.shown)(row.estimate.value);
+            "", "error", Plain => |row| format!("{} %", significant(100.0 * row.estimate.relative_error, 2));
+            .align(Right); .label("relative standard error");
+            "", "95 % interval", Plain => |row| row.estimate.interval.map(row.shown).join(" to ");
+            "value", "estimate", Digits(5) => |row| row.estimate.value; .only_in_files();
+            "relative_error", "relative standard error", Digits(5) => |row| row.estimate.relative_error;
+            .only_in_files();
+            "low", "lower end of the 95 % interval", Digits(5) => |row| row.estimate.interval[0]; .only_in_files();
+            "high", "upper end of the 95 % interval", Digits(5) => |row| row.estimate.interval[1]; .only_in_files();
+            "unit", "unit of the numbers", Plain => |row| row.unit; .only_in_files();
+        }
+    }
+
+    fn estimates(&self) -> Vec<EstimateRow> {
         let calibration = &self.calibration;
-        let mut rows = Vec::new();
-        let mut row = |name: &str, estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
-            let [low, high] = estimate.interval.map(shown);
-            let percent = significant(100.0 * estimate.relative_error, 2);
-            rows.push([
-                name.to_owned(),
-                shown(estimate.value),
-                format!("{percent} %"),
-                format!("{low} to {high}"),
-            ]);
-        };
-        let stiffness = |value| Kind::Stiffness.format(value);
-        if let Some(k) = &calibration.stiffness {
-            row("spring constant k", k, &stiffness);
-        }
-        if let Some(k) = &calibration.stiffness_along_normal {
-            row("k along the sample's normal", k, &stiffness);
-        }
-        if let Some(sader) = &calibration.sader {
-            row("k by Sader's method", &sader.stiffness, &stiffness);
-        }
-        row("resonance f0", &calibration.frequency, &|value| {
-            Kind::Frequency.format_digits(value, 6)
-        });
-        row("quality factor Q", &calibration.quality, &|value| {
-            significant(value, 4)
-        });
-        if let Some(sensitivity) = &calibration.sensitivity {
-            row("sensitivity (InvOLS)", sensitivity, &|value| {
-                format!("{} nm/V", significant(1e9 * value, 4))
-            });
-        }
-        let kind = match calibration.unit {
-            Unit::Volt => Kind::Voltage,
-            Unit::Metre => Kind::Length,
+        let stiffness: Shown = ("N/m", |value| Kind::Stiffness.format(value));
+        let frequency: Shown = ("Hz", |value| Kind::Frequency.format_digits(value, 6));
+        let sensitivity: Shown = ("m/V", |value| SENSITIVITY.format_digits(value, 4));
+        let [rms, floor]: [Shown; 2] = match calibration.unit {
+            Unit::Volt => [
+                ("V", |value| Kind::Voltage.format(value)),
+                ("V/sqrt(Hz)", |value| {
+                    format!("{}/√Hz", Kind::Voltage.format(value))
+                }),
+            ],
+            Unit::Metre => [
+                ("m", |value| Kind::Length.format(value)),
+                ("m/sqrt(Hz)", |value| {
+                    format!("{}/√Hz", Kind::Length.format(value))
+                }),
+            ],
         };
         // Roots halve the errors.
-        let root = |of: &Estimate| Estimate::new(of.value.sqrt(), 0.5 * of.relative_error);
-        let rms = root(&calibration.mean_square);
-        row("rms of the mode", &rms, &|value| kind.format(value));
-        if let Some(floor) = &calibration.floor {
-            row("noise floor", &root(floor), &|value| {
-                format!("{}/√Hz", kind.format(value))
-            });
-        }
-        rows
+        let root = |of: Estimate| Estimate::new(of.value.sqrt(), 0.5 * of.relative_error);
+        let of_sader = calibration.sader.map(|sader| sader.stiffness);
+        let rows = [
+            ("spring constant k", calibration.stiffness, stiffness),
+            (
+                "k along the sample's normal",
+                calibration.stiffness_along_normal,
+                stiffness,
+            ),
+            ("k by Sader's method", of_sader, stiffness),
+            ("resonance f0", Some(calibration.frequency), frequency),
+            (
+                "quality factor Q",
+                Some(calibration.quality),
+                ("", |value| significant(value, 4)),
+            ),
+            ("sensitivity (InvOLS)", calibration.sensitivity, sensitivity),
+            ("rms of the mode", Some(root(calibration.mean_square)), rms),
+            ("noise floor", calibration.floor.map(root), floor),
+        ];
+        let known = rows.into_iter().filter_map(|(name, estimate, of)| {
+            Some(EstimateRow {
+                name,
+                estimate: estimate?,
+                unit: of.0,
+                shown: of.1,
+            })
+        });
+        known.collect()
     }
+}
+
+/// A unit, and how a number in it is shown.
+type Shown = (&'static str, fn(f64) -> String);
+
+/// A row of the table of estimates.
+#[derive(Clone, Copy)]
+struct EstimateRow {
+    name: &'static str,
+    estimate: Estimate,
+    /// The SI unit of its numbers; empty for a pure number.
+    unit: &'static str,
+    shown: fn(f64) -> String,
 }
 
 /// Calibrates a lever from the content of such a file with this name.

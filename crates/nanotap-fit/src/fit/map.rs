@@ -56,7 +56,7 @@ impl DatasetStudy for FitMap {
     type Options = FitOptions;
     type Report = FitMapReport;
 
-    fn solves_distance(_: &FitOptions) -> bool {
+    fn any_distance(_: &FitOptions) -> bool {
         true
     }
 
@@ -70,6 +70,10 @@ impl DatasetStudy for FitMap {
 
     fn report(store: &Store) -> Result<FitMapReport, StoreError> {
         FitMapReport::of(store)
+    }
+
+    fn frames(report: &FitMapReport) -> Vec<Frame<'_>> {
+        vec![report.parameter_table()]
     }
 
     fn figure(store: &Store) -> Result<Figure, StoreError> {

@@ -32,6 +32,7 @@ mod branches;
 mod data;
 mod effort;
 mod force_curve;
+mod force_curve_table;
 mod guess;
 mod implied_case;
 pub mod instrument;
@@ -58,6 +59,7 @@ use nanotap_dynamics::Control;
 use crate::figure::fit::fit_figure;
 pub use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
+pub use force_curve_table::force_curve_table;
 pub use implied_case::{ImpliedWords, implied_words};
 pub(crate) use map::OF_FORCES;
 pub use map::{FitMap, FitMapReport, MapFile, MappedParameter};
@@ -208,6 +210,7 @@ impl Study for FitStudy {
             report.row_table(),
             report.law_table(),
             report.parameter_table(),
+            force_curve_table(&report.force_curves),
         ]
     }
 

@@ -245,12 +245,15 @@ pub struct FittedForceCurve {
     /// Unit of the baseline.
     pub baseline_unit: String,
     /// Lowest force of the model on the way back, N, under a law that attracts.
+    #[schemars(extend("x-unit" = "N"))]
     pub adhesion_force: Option<f64>,
     /// Contact law; missing for the linear default.
     pub law: Option<String>,
     /// Radius of the tip, m, if the law has one.
+    #[schemars(extend("x-unit" = "m"))]
     pub tip_radius: Option<f64>,
     /// Half angle of the tip, rad, if the law has one.
+    #[schemars(extend("x-unit" = "rad"))]
     pub half_angle: Option<f64>,
     /// Poisson's ratio of the sample.
     pub poisson: Option<f64>,
@@ -263,18 +266,24 @@ pub struct FittedForceCurve {
     /// Name of the deflection or the force in the file.
     pub deflection: String,
     /// Stiffness of the lever, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub spring_constant: f64,
     /// Where that comes from: `header` of the file, or `case`.
     pub spring_constant_from: String,
     /// Stiffness of the lever in the header of the file, N/m.
+    #[schemars(extend("x-unit" = "N/m"))]
     pub spring_constant_in_header: Option<f64>,
     /// Sensitivity in the header of the file, m/V.
+    #[schemars(extend("x-unit" = "m/V"))]
     pub sensitivity_in_header: Option<f64>,
     /// Largest force, N.
+    #[schemars(extend("x-unit" = "N"))]
     pub largest_force: f64,
     /// Largest indentation, m.
+    #[schemars(extend("x-unit" = "m"))]
     pub largest_indentation: f64,
     /// Root mean square of the residuals as a force, N.
+    #[schemars(extend("x-unit" = "N"))]
     pub residual_force: f64,
     /// Sentences on what to be careful of.
     pub cautions: Vec<String>,

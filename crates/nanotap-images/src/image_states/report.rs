@@ -67,6 +67,7 @@ rows! {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PossibleAssignment {
     /// Measured phase where the lag is zero, degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase_offset: f64,
     /// Whether the measured phase is a lag or a lead.
     pub sense: Sense,
@@ -148,10 +149,13 @@ pub struct ImageStatesReport {
     #[schemars(extend("x-unit" = "m"))]
     pub amplitude_noise: f64,
     /// Noise of the phase in a pixel, degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase_noise: f64,
     /// Measured phase where the lag is zero, degrees.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase_offset: Option<f64>,
     /// Standard error of this offset, degrees; zero if it is given.
+    #[schemars(extend("x-unit" = "degree"))]
     pub phase_offset_error: Option<f64>,
     /// Whether the measured phase is a lag or a lead.
     pub sense: Option<Sense>,

@@ -751,8 +751,9 @@ def calibrate(
             message = f"data: expected one table, got {len(found)}"
             raise ValueError(message)
         path, table = None, json.dumps(found[0])
-    document, shown = _nanotap.calibrate(path, table, json.dumps(request))
-    return Report(json.loads(document), Answer(None, **json.loads(shown)))
+    core = _nanotap.calibrate(path, table, json.dumps(request))
+    about = (None, ("calibrate", ""))
+    return Report(json.loads(core.document), Answer(core), *about)
 
 
 @stoppable()

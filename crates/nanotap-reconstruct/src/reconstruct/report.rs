@@ -3,10 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use nanotap_case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use nanotap_case::physical::quantity::{JOULES_PER_ELECTRONVOLT, format_electronvolts};
 use nanotap_case::units::Units;
 use nanotap_motions::approach::Way;
 use nanotap_observe::frame::{FileUnit, Frame, Rows, frame};
+use nanotap_quantity::Kind;
+use nanotap_quantity::number::{counted, significant};
 
 /// Force and dissipation from a measured curve. Values are in SI for a physical case, otherwise in
 /// model units; phases in degrees.
@@ -30,6 +32,7 @@ pub struct ReconstructReport {
     /// tip.
     pub free_amplitude: f64,
     /// Free phase as measured, in degrees; in frequency modulation the phase that is held.
+    #[schemars(extend("x-unit" = "degree"))]
     pub free_phase: f64,
     /// Number of rows from which the free level is known; 0 if it was given or is the case's.
     pub free_rows: usize,
@@ -175,6 +178,60 @@ impl ReconstructReport {
         });
         let last = last.map(|(k, _)| k + 2).next_back().unwrap_or(0);
         last.max(even).min(table.distance.len())
+    }
+
+    /// What the whole says of the force, a line a quantity.
+    pub fn summary_table(&self) -> Frame<'_> {
+        let shown = |kind: Kind, value: f64, digits: usize| {
+            let kind = if self.physical { kind } else { Kind::Number };
+            kind.format_digits(value, digits)
+        };
+        let minimum = |minimum: &ForceMinimum| {
+            let [force, error] = [(minimum.force, 4), (minimum.force_error, 2)]
+                .map(|(value, digits)| shown(Kind::Force, value, digits));
+            let at = shown(Kind::Length, minimum.distance, 4);
+            format!("{force} ± {error} at {at}")
+        };
+        let dissipated = self.rows.iter().filter_map(|row| row.dissipation);
+        let dissipation = match dissipated.reduce(f64::max) {
+            None => "not measured".to_owned(),
+            Some(_) if !self.has_damping => "not determined".to_owned(),
+            Some(joules) if self.physical => format_electronvolts(joules),
+            Some(energy) => significant(energy, 4),
+        };
+        let source = match (self.method, self.free_rows) {
+            (ReconstructMethod::FrequencyModulation, _) => "held".to_owned(),
+            (_, 0) => "given".to_owned(),
+            (_, rows) => format!("from {}", counted(rows, "row", "rows")),
+        };
+        let lines = [
+            ("minimum of the force", self.minimum.as_ref().map(minimum)),
+            (
+                "closest approach",
+                Some(shown(Kind::Length, self.closest, 4)),
+            ),
+            ("largest dissipation", Some(dissipation)),
+            (
+                "free amplitude and phase",
+                Some(format!(
+                    "{}, {}° ({source})",
+                    shown(Kind::Length, self.free_amplitude, 5),
+                    significant(self.free_phase, 5)
+                )),
+            ),
+            (
+                "mean squared residual",
+                Some(format!("{} in standard errors", significant(self.chi2, 3))),
+            ),
+            ("effective parameters", Some(significant(self.freedom, 3))),
+        ];
+        let known = lines
+            .into_iter()
+            .filter_map(|(name, text)| Some((name, text?)));
+        frame! { Rows::new("summary", known, None);
+            "quantity", "", Plain => |(name, _)| name;
+            "value", "", Plain => |(_, text)| text;
+        }
     }
 
     /// The force against the distance; in files in nm, nN, eV and N s/m, as `sample.law = "table"`

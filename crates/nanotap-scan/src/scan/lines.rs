@@ -92,7 +92,7 @@ impl DatasetStudy for ScanLines {
     type Options = ScanOptions;
     type Report = ScanReport;
 
-    fn solves_distance(_: &ScanOptions) -> bool {
+    fn any_distance(_: &ScanOptions) -> bool {
         true
     }
 

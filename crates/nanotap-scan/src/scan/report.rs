@@ -310,8 +310,10 @@ pub struct ImageCause {
     /// Number of the drive period with which it ends; `null` if it lasts.
     pub until_k: Option<usize>,
     /// Position along the line where it ends, m; `null` if it lasts.
+    #[schemars(extend("x-unit" = "m"))]
     pub until_x: Option<f64>,
     /// Change of the height that is not the surface's, m; `null` where it is not known.
+    #[schemars(extend("x-unit" = "m"))]
     pub height: Option<f64>,
     /// Number of the material above which it acts: 0 is the case's own sample.
     pub material: Option<usize>,
@@ -337,18 +339,24 @@ pub struct LoopReport {
     /// oscillates.
     pub spectral_radius: f64,
     /// Integral gain at which the loop starts to oscillate, 1/s; `null` if none makes it oscillate.
+    #[schemars(extend("x-unit" = "1/s"))]
     pub largest_stable_gain: Option<f64>,
     /// Frequency in Hz at which the height lags the surface by 45°.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub bandwidth_45: Option<f64>,
     /// Frequency in Hz at which the height follows with 1/√2 of the surface's amplitude.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub bandwidth_3db: Option<f64>,
     /// Largest ratio of the height to the surface over all frequencies, dimensionless.
     pub peaking: f64,
     /// Rule of thumb for the bandwidth in Hz: 1/16 of the inverse of all delays.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub rule_of_thumb: f64,
     /// Integral gain in 1/s with the largest bandwidth for a peaking of at most 1.1.
+    #[schemars(extend("x-unit" = "1/s"))]
     pub suggested_gain: Option<f64>,
     /// Bandwidth in Hz at 45° with the suggested gain.
+    #[schemars(extend("x-unit" = "Hz"))]
     pub suggested_bandwidth: Option<f64>,
 }
 
@@ -384,6 +392,7 @@ pub struct ScanReport {
     #[schemars(extend("x-unit" = "m"))]
     pub z0: f64,
     /// Integral gain of the feedback, 1/s.
+    #[schemars(extend("x-unit" = "1/s"))]
     pub integral_gain: f64,
     /// Whether each line settled anew, so that lines are independent.
     pub independent_lines: bool,

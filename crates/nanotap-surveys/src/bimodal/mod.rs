@@ -106,7 +106,6 @@ rows! {
         /// Frequency of the drive, Hz.
         pub frequency: f64 = Frequency, "frequency", "frequency", Prefixed(7),
         /// Strength of the drive: its force in N, or a driven base's amplitude in m.
-        #[schemars(extend("x-unit" = "m"))]
         pub drive_strength: f64,
         /// Stiffness of the mode at the tip in N/m.
         pub stiffness: f64 = Si(Kind::Stiffness), "stiffness of the mode", "stiffness", Prefixed(4),
@@ -132,7 +131,6 @@ rows! {
         /// Frequency less that of the free lever in Hz.
         pub frequency_shift: f64 = Frequency, "frequency shift $Δf$", "Δf", Prefixed(4),
         /// Strength of the drive: its force in N, or a driven base's amplitude in m.
-        #[schemars(extend("x-unit" = "m"))]
         pub drive_strength: f64,
         /// Strength of the drive over that of the free lever, dimensionless.
         pub drive_ratio: f64 = Number, "drive / free drive", "drive", Digits(4),

@@ -145,7 +145,7 @@ impl DatasetStudy for SweepStudy {
     type Options = SweepOptions;
     type Report = Summary;
 
-    fn solves_distance(options: &SweepOptions) -> bool {
+    fn any_distance(options: &SweepOptions) -> bool {
         options.over.solves_distance()
     }
 

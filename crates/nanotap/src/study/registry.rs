@@ -34,6 +34,8 @@
 //! chunk by chunk. [`StudyEntry::answer`] gives the
 //! report itself, with its document, its tables and its figure.
 
+use std::sync::Arc;
+
 use nanotap_dynamics::Control;
 use nanotap_figures::Figure;
 use schemars::Schema;
@@ -43,6 +45,7 @@ pub use crate::study::STUDIES;
 use nanotap_case::Case;
 use nanotap_dataset::Store;
 use nanotap_error::Error;
+use nanotap_fit::calibrate::CalibrateReport;
 use nanotap_motions::setpoint::at_setpoint;
 use nanotap_observe::frame::Frame;
 pub use nanotap_study::DatasetPlan;
@@ -68,20 +71,18 @@ pub struct StudyEntry {
     pub partial: bool,
     /// Whether it has a figure, which its command draws with `--plot`.
     pub has_figure: bool,
-    /// Whether it chooses the distance itself, so that none is solved for a setpoint.
-    pub any_distance: bool,
+    /// Whether it chooses distances itself under this request, so that none is solved for a setpoint.
+    pub any_distance: fn(&Value) -> Result<bool, Error>,
     /// Runs it to its report, if that is a document.
     pub answer: Option<Run<Box<dyn Answer>>>,
-    /// Whether what is computed into a dataset by a request solves for distances itself.
-    pub solves_distance: fn(&Value) -> Result<bool, Error>,
     /// Plans what is to be computed into a dataset, if it leaves one.
     pub dataset: Option<Run<DatasetPlan>>,
-    /// The JSON of the summary of its finished dataset, if it leaves one, and its figure.
+    /// The summary of its finished dataset, if it leaves one.
     pub summary: Option<Summarise>,
 }
 
-/// What summarises a finished dataset, as JSON, and draws it.
-pub type Summarise = fn(&Store) -> Result<(Value, Figure), Error>;
+/// What summarises a finished dataset and draws it.
+pub type Summarise = fn(&Store) -> Result<Box<dyn Answer>, Error>;
 
 /// What runs a study on a case, from the JSON of its request.
 pub type Run<R> = fn(&Case, Value, &Control<'_>) -> Result<R, Error>;
@@ -101,9 +102,13 @@ pub trait Answer: Send {
     fn figure(&self) -> Option<Figure>;
 }
 
-struct Answered<S: Study> {
-    case: Case,
-    report: S::Report,
+/// The report of a study on a case, for front ends that ask more of it than an [`Answer`] says.
+#[derive(Debug)]
+pub struct Answered<S: Study> {
+    /// The case, at the distance at which it was studied.
+    pub case: Arc<Case>,
+    /// The report.
+    pub report: S::Report,
 }
 
 impl<S: Study> Answer for Answered<S> {
@@ -121,6 +126,40 @@ impl<S: Study> Answer for Answered<S> {
     }
 }
 
+/// The summary of a dataset.
+struct Summarised<S: DatasetStudy> {
+    report: S::Report,
+    figure: Figure,
+}
+
+impl<S: DatasetStudy> Answer for Summarised<S> {
+    fn document(&self) -> Result<String, Error> {
+        Ok(serde_json::to_string(&self.report)?)
+    }
+
+    fn frames(&self) -> Vec<Frame<'_>> {
+        S::frames(&self.report)
+    }
+
+    fn figure(&self) -> Option<Figure> {
+        Some(self.figure.clone())
+    }
+}
+
+impl Answer for CalibrateReport {
+    fn document(&self) -> Result<String, Error> {
+        Ok(serde_json::to_string(self)?)
+    }
+
+    fn frames(&self) -> Vec<Frame<'_>> {
+        self.tables()
+    }
+
+    fn figure(&self) -> Option<Figure> {
+        Some(self.figure())
+    }
+}
+
 impl StudyEntry {
     pub(super) const fn of<S: Study + 'static>() -> Self {
         Self {
@@ -131,7 +170,7 @@ impl StudyEntry {
             counted: S::COUNTED,
             partial: S::PARTIAL,
             has_figure: S::HAS_FIGURE,
-            any_distance: S::ANY_DISTANCE,
+            any_distance: |_| Ok(S::ANY_DISTANCE),
             answer: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
                 let case = if S::ANY_DISTANCE {
@@ -140,31 +179,31 @@ impl StudyEntry {
                     at_setpoint(case.clone(), control)?.0
                 };
                 let report = S::run(&case, &request, control)?;
+                let case = Arc::new(case);
                 Ok(Box::new(Answered::<S> { case, report }))
             }),
-            solves_distance: |_| Ok(S::ANY_DISTANCE),
             dataset: None,
             summary: None,
         }
     }
 
     /// The same study, whose report can be a dataset, too.
-    pub(super) const fn or_dataset<S: DatasetStudy>(self) -> Self {
+    pub(super) const fn or_dataset<S: DatasetStudy + 'static>(self) -> Self {
         let Self {
-            solves_distance,
+            any_distance,
             dataset,
             summary,
             ..
         } = Self::dataset::<S>();
         Self {
-            solves_distance,
+            any_distance,
             dataset,
             summary,
             ..self
         }
     }
 
-    pub(super) const fn dataset<S: DatasetStudy>() -> Self {
+    pub(super) const fn dataset<S: DatasetStudy + 'static>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
@@ -173,15 +212,14 @@ impl StudyEntry {
             counted: S::COUNTED,
             partial: true,
             has_figure: true,
-            any_distance: false,
-            answer: None,
-            solves_distance: |request| {
+            any_distance: |request| {
                 let request = read::<S::Options>(request.clone())?;
-                Ok(S::solves_distance(&request))
+                Ok(S::any_distance(&request))
             },
+            answer: None,
             dataset: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
-                let case = if S::solves_distance(&request) {
+                let case = if S::any_distance(&request) {
                     case.clone()
                 } else {
                     at_setpoint(case.clone(), control)?.0
@@ -189,8 +227,8 @@ impl StudyEntry {
                 S::plan(&case, &request, control)
             }),
             summary: Some(|store| {
-                let summary = serde_json::to_value(S::report(store)?)?;
-                Ok((summary, S::figure(store)?))
+                let (report, figure) = (S::report(store)?, S::figure(store)?);
+                Ok(Box::new(Summarised::<S> { report, figure }))
             }),
         }
     }

@@ -14,6 +14,7 @@ use nanotap::study::Study as _;
 use nanotap::study::scan::{
     Cause, ImageCause, Interaction, Method, ScanOptions, ScanReport, ScanStudy,
 };
+use nanotap::study::setpoint::solve_setpoint;
 use serde_json::{Value, json};
 
 const REFERENCE: &str = include_str!("scan/scan_reference.json");
@@ -310,6 +311,54 @@ fn a_flat_sample_gives_the_orbit_of_every_law() {
     }
 }
 
+/// Without a height the scan starts in the motion in which the lever comes from far: here in attraction,
+/// at the setpoint, from the first period on. In its free motion at the same height the lever would be
+/// thrown into the repulsive state, which exists there, too.
+#[test]
+fn the_lever_starts_in_the_state_in_which_it_comes() {
+    let text = "\
+cantilever.lever = \"PPP-NCHR\"
+cantilever.Q = 400
+sample = { material = \"polystyrene\", law = \"dmt\", hamaker = \"7e-20 J\" }
+drive.frequency_ratio = 1
+drive.free_amplitude = \"10 nm\"
+drive.setpoint = 0.9
+[scan]
+size = \"100 nm\"
+settle = 0
+periods = 2000
+pixels = 10
+integral_bandwidth = \"50 Hz\"
+";
+    let case = parsed(text, &[]);
+    let solved = solve_setpoint(&case, &Control::default()).unwrap();
+    let chosen = &solved.solutions[solved.chosen];
+    assert!(chosen.observables.phase > 100.0);
+    // The quasi-static method is linear between motions at distances of 20 pm.
+    for (method, error, angle) in [
+        (Method::Exact, 1e-14, 1e-3),
+        (Method::QuasiStatic, 1e-12, 0.1),
+    ] {
+        let options = ScanOptions {
+            method: Some(method),
+            ..ScanOptions::default()
+        };
+        let report = scan(&case, &options).unwrap();
+        assert!((report.z0 / solved.zc() - 1.0).abs() < 1e-12);
+        let [line, ..] = &report.lines[..] else {
+            panic!("no line")
+        };
+        assert!(line.error_rms < error, "{method:?}: {}", line.error_rms);
+        for phase in &report.trace.phase[0] {
+            let off = (phase - chosen.observables.phase).abs();
+            assert!(off < angle, "{method:?}: {phase}");
+        }
+    }
+    let given = parsed(text, &[&format!("scan.z0={:e} m", solved.zc())]);
+    let thrown = scan(&given, &ScanOptions::default()).unwrap();
+    assert!(thrown.lines[0].peak_force_max > 1e-9);
+}
+
 #[test]
 fn independent_lines_are_the_same_on_any_number_of_threads() {
     let case = parsed(
@@ -416,14 +465,15 @@ fn causes_of(report: &ScanReport) -> Vec<Cause> {
 }
 
 /// A soft lever under DMT contact on a plateau of 10 nm (FINDINGS A5): behind the falling edge it flies,
-/// governed by attraction, and comes back to the state in which it was.
+/// governed by attraction, and comes back to the state in which it was. From its free motion at this height
+/// it is thrown into repulsion; where it comes from far it begins in attraction, and the edge throws it.
 const EDGE: &str = "[cantilever]\nk = \"0.8736193621040327 N/m\"\nf0 = \"100 kHz\"\nQ = 200\n\
     [tip]\nradius = \"5 nm\"\nmodulus = \"160 GPa\"\npoisson = 0.3\n\
     [sample]\nlaw = \"dmt\"\nmodulus = \"1 GPa\"\npoisson = 0.3\nhamaker = \"30 zJ\"\n\
     intermolecular_distance = \"169 pm\"\n\
     [drive]\nfrequency = \"100 kHz\"\nfree_amplitude = \"20 nm\"\nactuation = \"tip\"\n\
     [gap]\ntip = \"18 nm\"\n[model]\nmodes = 1\n\
-    [scan]\nsize = \"500 nm\"\nsetpoint = 0.8\nintegral_gain = 785\nretrace = false\n\
+    [scan]\nsize = \"500 nm\"\nsetpoint = 0.8\nz0 = \"16.18 nm\"\nintegral_gain = 785\nretrace = false\n\
     periods = 12500\npixels = 50\nsettle = 1500\n\
     surface = [{ step = { from = \"125 nm\", to = \"325 nm\", height = \"10 nm\" } }]\n";
 

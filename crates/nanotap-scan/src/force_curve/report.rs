@@ -127,9 +127,9 @@ rows! {
         pub adhesion_energy: f64 = Energy, "area between the retract and zero force where the sample attracts", "work of adhesion", Prefixed(5),
         /// Energy lost in the cycle, −∮F dz, J.
         pub energy_lost: f64 = Energy, "area between approach and retract", "energy lost", Prefixed(5),
-        /// Part of the lost energy that the tip gives to the sample, J; the rest rings down in the
-        /// lever.
-        pub dissipation: f64 = Energy, "the rest rings down in the lever", "  in the sample", Prefixed(5),
+        /// Energy that the tip gives to the sample, J: of an undriven lever a part of the lost energy, whose
+        /// rest rings down in the lever; of a driven one the drive pays for it, too.
+        pub dissipation: f64 = Energy, "energy that the tip gives to the sample", "given to the sample", Prefixed(5),
     }
 }
 

@@ -83,24 +83,30 @@ pub(super) struct Instrument<'a> {
 }
 
 impl<'a> Instrument<'a> {
-    /// The instrument at the start of a scan, the lever in its free motion.
+    /// The instrument at the start of a scan, the lever in the motion in which it comes from far, or in its
+    /// free motion at a given height.
     ///
     /// # Errors
-    /// When a case has no model.
+    /// When a case has no model, or the flow fails.
     pub(super) fn new(plan: &'a Plan) -> Result<Self, Error> {
         let levers: Result<Vec<Lever>, Error> = plan.materials.iter().map(Lever::new).collect();
         let mut levers = levers?;
         let first = &mut levers[0];
+        let beam = plan.start.as_deref();
         let (state, free, free_force) = (
-            first.free_start(),
+            first.start(beam),
             first.free_deflection(),
             first.free_force(),
         );
         let gap = plan.z0 / plan.length_unit;
+        let reading = match beam {
+            Some(_) => first.clone().advance(&mut state.clone(), gap)?.deflection,
+            None => free,
+        };
         let levers = if plan.method == Method::QuasiStatic {
             let steady = levers
                 .into_iter()
-                .map(|lever| SteadyLever::new(lever, gap, free.modulus()));
+                .map(|lever| SteadyLever::new(lever, beam, gap, free.modulus()));
             Levers::Steady(steady.collect())
         } else {
             Levers::Moving(levers)
@@ -109,7 +115,7 @@ impl<'a> Instrument<'a> {
             levers,
             material: 0,
             state,
-            electronics: Electronics::new(plan, free, free_force),
+            electronics: Electronics::new(plan, reading, free_force),
         })
     }
 

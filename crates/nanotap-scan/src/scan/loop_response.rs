@@ -107,10 +107,13 @@ pub(super) fn loop_report(
     }
     let own = settled.material();
     let mut lever = settled.lever_above(own);
-    // From where the scan is, and for a loop that hunts from the free motion at the start.
+    // From where the scan is, and for a loop that hunts from the motion at the start.
     let starts = [
         (settled.lever_state().to_vec(), gap),
-        (lever.free_start(), plan.z0 / plan.length_unit),
+        (
+            lever.start(plan.start.as_deref()),
+            plan.z0 / plan.length_unit,
+        ),
     ];
     let mut found = starts
         .into_iter()

@@ -19,6 +19,7 @@ use nanotap_case::key::Key;
 use nanotap_case::physical::{Kind, Physical};
 use nanotap_error::Error;
 use nanotap_motions::setpoint::at_setpoint;
+use nanotap_observe::{ObservableSet, RecordOptions, record};
 
 /// The checked options of a scan. Lengths in m, times in s.
 #[derive(Clone, Debug)]
@@ -47,6 +48,8 @@ pub(super) struct Plan {
     pub(super) integral_gain: f64,
     pub(super) gains: Gains,
     pub(super) z0: f64,
+    /// The beam's state at drive phase 180° at the start, in the model's units; None: its free motion.
+    pub(super) start: Option<Vec<f64>>,
     /// Time constant of a stage of the lock-in amplifier, s, and the number of stages.
     pub(super) lock_in: (f64, usize),
     /// Resonance frequency, Hz, and quality factor of the z scanner; None if it is rigid.
@@ -122,9 +125,12 @@ impl Plan {
         let free_amplitude = view.free_amplitude;
         let setpoint = setpoint(&options, view)?;
         let mode = options.mode.unwrap_or_default();
-        let z0 = match length(options.z0.as_ref(), "z0")? {
-            Some(z0) => z0,
-            None => found_distance(case, setpoint, control)?,
+        let (z0, start) = match length(options.z0.as_ref(), "z0")? {
+            Some(z0) => (z0, None),
+            None => {
+                let (distance, state) = found_start(case, setpoint, control)?;
+                (distance, Some(state))
+            }
         };
         let (integral_gain, gains) = gains(&options, frequency)?;
         let surface = surface(&options, case, [size, size_y])?;
@@ -161,6 +167,7 @@ impl Plan {
             integral_gain,
             gains,
             z0,
+            start,
             lock_in: lock_in(&options, frequency)?,
             z_scanner: z_scanner(&options)?,
             dynamic: dynamic(&options, setpoint)?,
@@ -351,17 +358,43 @@ fn setpoint(options: &ScanOptions, view: &Physical) -> Result<f64, Error> {
     ))
 }
 
-/// Finds the distance at which the amplitude of a lever that approaches from far has fallen to the
-/// setpoint.
-fn found_distance(case: &Case, setpoint: f64, control: &Control<'_>) -> Result<f64, Error> {
+/// Finds the distance in m at which the amplitude of a lever that approaches from far has fallen to the
+/// setpoint, and the beam's state there at drive phase 180°, in the units of the model of `case`.
+fn found_start(
+    case: &Case,
+    setpoint: f64,
+    control: &Control<'_>,
+) -> Result<(f64, Vec<f64>), Error> {
+    let length_of = |case: &Case| case.physical().map_or(1.0, |view| view.scales.length);
+    let to = length_of(case);
     let words = [
         format!("drive.setpoint={setpoint:?}"),
         "gap.tip=".to_owned(),
     ];
     let case = case.restated(&words)?;
-    let (found, _) = at_setpoint(case.cancelled_by(control), control)
+    let (found, report) = at_setpoint(case.cancelled_by(control), control)
         .map_err(|error| error.context("z0 is not given"))?;
-    Ok(found.get(Key::GapTip))
+    let model = found.model()?;
+    let motion = report.and_then(|report| {
+        let chosen = report.solutions.into_iter().nth(report.chosen)?;
+        Some(chosen.state)
+    });
+    let motion = motion.unwrap_or_else(|| model.rest());
+    let kept = RecordOptions {
+        recorded: 1,
+        ..RecordOptions::default()
+    };
+    let recorded = record(&model, &motion, 1, ObservableSet::NONE, kept)?;
+    let state = recorded.recording.state_at(0.5 * model.period());
+    let state =
+        state.ok_or_else(|| Error::numerics("the motion at the setpoint was not recorded"))?;
+    let beam = 2 * nanotap_study::cantilever(&found, "scan")?.modes;
+    let scale = length_of(&found) / to;
+    let state = state.into_iter().take(beam);
+    Ok((
+        found.get(Key::GapTip),
+        state.map(|entry| scale * entry).collect(),
+    ))
 }
 
 impl ScanOptions {

@@ -29,9 +29,9 @@ pub(super) struct SteadyLever {
 }
 
 impl SteadyLever {
-    /// In the free motion at distance `gap`.
-    pub(super) fn new(lever: Lever, gap: f64, free_amplitude: f64) -> Self {
-        let state = lever.free_start();
+    /// In the motion with a state of the beam at drive phase 180°, or else the free one, at distance `gap`.
+    pub(super) fn new(lever: Lever, beam: Option<&[f64]>, gap: f64, free_amplitude: f64) -> Self {
+        let state = lever.start(beam);
         let at = number(gap, free_amplitude);
         Self {
             lever,

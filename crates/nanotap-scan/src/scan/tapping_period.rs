@@ -99,9 +99,14 @@ impl Lever {
         })
     }
 
-    /// State of the steady motion far from the sample, at drive phase 180°.
-    pub(super) fn free_start(&self) -> Vec<f64> {
-        self.free_start.clone()
+    /// State at drive phase 180° with this one of the beam, or without it of the steady motion far from
+    /// the sample; the sample is relaxed.
+    pub(super) fn start(&self, beam: Option<&[f64]>) -> Vec<f64> {
+        let mut state = self.free_start.clone();
+        if let Some(beam) = beam {
+            state[..self.beam].copy_from_slice(beam);
+        }
+        state
     }
 
     /// Complex amplitude of the deflection far from the sample.

@@ -19,6 +19,9 @@ const HUNTING: f64 = 0.7;
 const LAGGING: f64 = 0.5;
 
 /// A length with three significant digits.
+/// Height in m below which a difference is rounding.
+const ROUNDING: f64 = 1e-15;
+
 fn length(value: f64) -> String {
     Kind::Length.format_digits(value, 3)
 }
@@ -291,10 +294,15 @@ pub(super) fn verdict(report: &ScanReport) -> String {
     }
     let largest = |of: fn(&LineStatistics) -> f64| report.lines.iter().map(of).fold(0.0, f64::max);
     match report.mode {
-        Mode::ConstantAmplitude => format!(
-            "The height follows the surface to {} (root mean square of a line).",
-            length(largest(|line| line.tracking_rms))
-        ),
+        Mode::ConstantAmplitude => {
+            let off = largest(|line| line.tracking_rms);
+            let within = if off < ROUNDING {
+                format!("less than {}", length(ROUNDING))
+            } else {
+                length(off)
+            };
+            format!("The height follows the surface to {within} (root mean square of a line).")
+        }
         Mode::ConstantHeight => format!(
             "The height is constant; the amplitude error shows the surface, to {} at most.",
             length(largest(|line| line

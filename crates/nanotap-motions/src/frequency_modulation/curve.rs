@@ -218,8 +218,111 @@ struct Curve<'a> {
 
 /// Largest number of steps of regula falsi.
 const STEPS: usize = 60;
+/// Distances per reach of the tip at which a requested shift is looked for.
+const PER_REACH: i32 = 50;
+/// Steps by which the turn of a curve is looked for.
+const TURNS: usize = 40;
+/// Part of the longer side at which the golden section looks next.
+const GOLDEN: f64 = 0.381_966;
 
 impl Curve<'_> {
+    /// A curve with further points where the tip may touch, at distances that do not depend on its own.
+    fn refined(
+        &self,
+        held: Held,
+        table: &[ApproachPoint],
+        control: &Control<'_>,
+    ) -> Vec<ApproachPoint> {
+        let step = self.free.reach / f64::from(PER_REACH);
+        let near = |gap: f64| {
+            let number = gap / step;
+            let (least, most) = (f64::from(-4 * PER_REACH), f64::from(2 * PER_REACH));
+            number.clamp(least, most)
+        };
+        let mut all = Vec::new();
+        for (k, point) in table.iter().enumerate() {
+            let before = k.checked_sub(1).map(|k| &table[k]);
+            let before = before.filter(|before| before.way == point.way);
+            if let Some((before, (gap, start))) = before.zip(before.and_then(driven)) {
+                let [from, to] = [near(before.gap), near(point.gap)];
+                let (low, high) = (from.min(to).floor() as i64 + 1, from.max(to).ceil() as i64);
+                let mut between: Vec<i64> = (low..high).collect();
+                if to < from {
+                    between.reverse();
+                }
+                let mut walk = self.walk(held, gap, start);
+                let found = between.into_iter().map_while(|number| {
+                    self.point_at(&mut walk, point.way, step * number as f64, control)
+                });
+                all.extend(found);
+            }
+            all.push(point.clone());
+        }
+        all
+    }
+
+    /// A walk over distances from a driven motion on the curve.
+    fn walk(&self, held: Held, gap: f64, start: Driven) -> HeldWalk<'_> {
+        let mut walk = HeldWalk::new(self.case, held, start, gap);
+        walk.keep(self.closest, self.free.reach / self.free.amplitude);
+        walk
+    }
+
+    /// The point at a distance to which a walk leads.
+    fn point_at(
+        &self,
+        walk: &mut HeldWalk<'_>,
+        way: Way,
+        gap: f64,
+        control: &Control<'_>,
+    ) -> Option<ApproachPoint> {
+        let orbit = walk.step(gap, control).ok()?.orbit;
+        let amplitude = walk.held(gap).amplitude;
+        self.point(way, gap, orbit, amplitude).ok()
+    }
+
+    /// The point beyond the requested shift near the middle of three points whose shifts lie on one side of
+    /// it, if the curve turns there.
+    fn turn(
+        &self,
+        held: Held,
+        shift: f64,
+        [before, here, after]: [&ApproachPoint; 3],
+        control: &Control<'_>,
+    ) -> Option<ApproachPoint> {
+        let side = excess(here, shift).signum();
+        let off = |point: &ApproachPoint| side * excess(point, shift);
+        if !(off(here) <= off(before) && off(here) <= off(after)) {
+            return None;
+        }
+        let (gap, start) = driven(before)?;
+        let mut walk = self.walk(held, gap, start);
+        let (mut low, mut middle, mut high) = (before.gap, (here.gap, off(here)), after.gap);
+        for _ in 0..TURNS {
+            // Into the longer of both parts.
+            let is_high = (high - middle.0).abs() > (middle.0 - low).abs();
+            let longer = if is_high { high } else { low };
+            let gap = middle.0 + GOLDEN * (longer - middle.0);
+            let point = self.point_at(&mut walk, before.way, gap, control)?;
+            let found = off(&point);
+            if found < 0.0 {
+                return Some(point);
+            }
+            // The end that lies behind the worse of both moves up to it.
+            let is_better = found < middle.1;
+            let end = if is_better == is_high {
+                &mut low
+            } else {
+                &mut high
+            };
+            *end = if is_better { middle.0 } else { gap };
+            if is_better {
+                middle = (gap, found);
+            }
+        }
+        None
+    }
+
     /// Finds the distances at which the shift has a value, between the points of each direction.
     fn setpoints(
         &self,
@@ -228,6 +331,19 @@ impl Curve<'_> {
         table: &[ApproachPoint],
         control: &Control<'_>,
     ) -> Vec<ApproachPoint> {
+        let mut table = self.refined(held, table, control);
+        let turns = table.windows(3).enumerate().filter_map(|(k, of)| {
+            let is_one_way = of[0].way == of[2].way;
+            let turn =
+                is_one_way.then(|| self.turn(held, shift, [&of[0], &of[1], &of[2]], control));
+            let point = turn.flatten()?;
+            let is_before = (point.gap - of[0].gap) * (point.gap - of[1].gap) < 0.0;
+            Some((k + if is_before { 1 } else { 2 }, point))
+        });
+        let turns: Vec<(usize, ApproachPoint)> = turns.collect();
+        for (place, point) in turns.into_iter().rev() {
+            table.insert(place, point);
+        }
         let pairs = table.windows(2).filter(|pair| pair[0].way == pair[1].way);
         let crossed =
             pairs.filter(|pair| (excess(&pair[0], shift) > 0.0) != (excess(&pair[1], shift) > 0.0));
@@ -253,8 +369,7 @@ impl Curve<'_> {
         let mut low = (a.gap, excess(a, shift));
         let mut high = (b.gap, excess(b, shift));
         let (gap, start) = driven(a)?;
-        let mut walk = HeldWalk::new(self.case, held, start, gap);
-        walk.keep(self.closest, self.free.reach / self.free.amplitude);
+        let mut walk = self.walk(held, gap, start);
         let mut closed = None;
         for step in 0..STEPS {
             let straight = low.0 - low.1 * (high.0 - low.0) / (high.1 - low.1);

@@ -413,6 +413,40 @@ fn a_shift_has_its_distances() {
     assert!((force / one.modulation.unwrap().drive_strength - 1.0).abs() < 1e-14);
 }
 
+/// The distances of a shift are the same for any points of the curve, those beside the lowest shift, between
+/// which few points see nothing, included.
+#[test]
+fn the_distances_of_a_shift_do_not_depend_on_the_points() {
+    let case = air(10.0, 11.0, &DMT);
+    let curve = |points: usize, shift: Option<f64>| {
+        let options = FrequencyModulationOptions {
+            from: Some(30e-9.into()),
+            to: Some(8e-9.into()),
+            points,
+            phase: 90.0,
+            shift: shift.map(Into::into),
+            ..FrequencyModulationOptions::default()
+        };
+        frequency_modulation(&case, &options, &Control::default()).unwrap()
+    };
+    let fine = curve(1000, None);
+    let shifts = fine.table.iter().filter_map(|p| p.modulation_si);
+    let least = shifts.fold(0.0, |low: f64, m| low.min(m.frequency_shift));
+    for shift in [-50.0, 0.9999 * least] {
+        let found = [3, 24].map(|points| {
+            let report = curve(points, Some(shift));
+            let setpoints = report.modulation.unwrap().setpoints.unwrap();
+            setpoints.iter().map(|p| p.gap).collect::<Vec<f64>>()
+        });
+        assert_eq!(found[0].len(), 4, "{shift}: {found:?}");
+        for other in &found[1..] {
+            for (one, other) in found[0].iter().zip(other) {
+                assert!((one / other - 1.0).abs() < 1e-6, "{shift}: {found:?}");
+            }
+        }
+    }
+}
+
 /// The base of a lever of low quality moves by a tenth of the deflection or more: the tip comes
 /// nearer than its deflection, and the ratio of base motion to deflection depends on the force.
 /// With a hundredth of the attraction, second-order terms are a hundredth.

@@ -226,9 +226,21 @@ pub fn compare(
             .collect(),
         None => cases(lever, options.arm)?,
     };
+    // The beam's part of the setpoint's motion: other laws have other memories.
+    let beam = 2 * lever.modes;
+    let start = case.model()?.start;
+    let start = start.map(|state| state[..beam].to_vec());
     let mut samples = levers
         .into_iter()
-        .map(|lever| motion(lever, options.period, frequencies, control))
+        .map(|lever| {
+            motion(
+                lever,
+                options.period,
+                start.as_deref(),
+                frequencies,
+                control,
+            )
+        })
         .collect::<Result<Vec<_>, Error>>()?;
     if force.is_some() {
         add_force_curves(&mut samples)?;
@@ -272,6 +284,7 @@ const CURVE_REACH: f64 = 2.0;
 fn motion(
     case: Cantilever,
     period: usize,
+    start: Option<&[f64]>,
     frequencies: Option<(f64, f64)>,
     control: &Control<'_>,
 ) -> Result<SampleMotion, Error> {
@@ -285,7 +298,19 @@ fn motion(
         harmonics: 0,
         ..OrbitOptions::default()
     };
-    let (found, reason) = match orbit(&model, &options) {
+    let near = start.map(|beam| {
+        let mut state = model.rest();
+        state[..beam.len()].copy_from_slice(beam);
+        let near = OrbitOptions {
+            state: Some(state.into()),
+            ..options.clone()
+        };
+        orbit(&model, &near)
+    });
+    let found = near
+        .and_then(Result::ok)
+        .map_or_else(|| orbit(&model, &options), Ok);
+    let (found, reason) = match found {
         Ok(found) => (Some(found), None),
         Err(error) => (None, Some(error.message())),
     };

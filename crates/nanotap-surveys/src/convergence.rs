@@ -149,6 +149,16 @@ pub fn convergence(
     options: &ConvergenceOptions,
     control: &Control<'_>,
 ) -> Result<Convergence, ModelError> {
+    convergence_from(case, options, None, control)
+}
+
+/// As [`convergence`], of the motion that starts from a state of the case with its own modes.
+fn convergence_from(
+    case: &Cantilever,
+    options: &ConvergenceOptions,
+    start: Option<&[f64]>,
+    control: &Control<'_>,
+) -> Result<Convergence, ModelError> {
     let tolerance = options.tolerance;
     // A lever whose modes were measured has no further ones.
     let largest = match case.lever_modes.len() {
@@ -159,25 +169,30 @@ pub fn convergence(
     let mut motions = Vec::new();
     let models: Vec<Model> = (1..=largest)
         .map(|modes| {
-            let model = Model::cantilever(&case.clone().with_modes(modes))?;
+            let mut model = Model::cantilever(&case.clone().with_modes(modes))?;
+            model.start = start.map(|state| {
+                let memory = state.len() - 2 * case.modes;
+                with_modes(state, memory, modes)
+            });
             Ok::<_, ModelError>(model.cancelled_by(&control.flag()))
         })
         .collect::<Result<_, _>>()?;
     for (modes, model) in (1..).zip(&models) {
-        let guess = OrbitOptions {
-            period: options.period,
-            state: carried(orbits.last(), modes).map(Into::into),
-            ..OrbitOptions::default()
+        let near = |state: Option<Vec<f64>>| {
+            let guess = OrbitOptions {
+                period: options.period,
+                state: state.map(Into::into),
+                ..OrbitOptions::default()
+            };
+            orbit(model, &guess)
         };
-        let found = orbit(model, &guess).or_else(|_| {
-            orbit(
-                model,
-                &OrbitOptions {
-                    state: None,
-                    ..guess
-                },
-            )
-        });
+        // Without a state the model's own start, or rest.
+        let mut guesses = [carried(orbits.last(), modes), None];
+        if model.start.is_some() {
+            guesses.reverse();
+        }
+        let found = guesses.into_iter().map(near).find(Result::is_ok);
+        let found = found.unwrap_or_else(|| near(Some(model.rest())));
         motions.push(motion(modes, found.as_ref().map_err(Error::message)));
         orbits.push(found.ok());
     }
@@ -343,7 +358,9 @@ impl Study for ConvergenceStudy {
         options: &ConvergenceOptions,
         control: &Control<'_>,
     ) -> Result<Convergence, Error> {
-        let mut found = convergence(cantilever(case, Self::NAME)?, options, control)?;
+        let lever = cantilever(case, Self::NAME)?;
+        let start = case.model()?.start;
+        let mut found = convergence_from(lever, options, start.as_deref(), control)?;
         if let Some((orbit, model)) = found.orbits.iter().zip(&found.models).next_back() {
             let state = orbit.as_ref().map(|orbit| &*orbit.state);
             let note = initial_state_note(model, false, state);

@@ -7,6 +7,9 @@ use nanotap::case::file::Source;
 use nanotap::case::physical::Catalogue;
 use nanotap::control::Control;
 use nanotap::model::parameter::Parameter;
+use nanotap::study::Study as _;
+use nanotap::study::contact_laws::{ContactLawsOptions, ContactLawsStudy};
+use nanotap::study::convergence::{ConvergenceOptions, ConvergenceStudy};
 use nanotap::study::frequency_modulation::{FrequencyModulationOptions, frequency_modulation};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::{
@@ -166,6 +169,20 @@ setpoint=0.9
     let run = simulate(&model, &SimulateOptions::default()).unwrap();
     assert!((run.observables.phase - 115.8).abs() < 0.1);
     assert!(!solved.unwrap().other_states.is_empty());
+    // Studies that compare motions are of this one, too.
+    let control = Control::default();
+    let options = ConvergenceOptions {
+        largest: 2,
+        ..ConvergenceOptions::default()
+    };
+    let compared = ConvergenceStudy::run(&at, &options, &control).unwrap();
+    for motion in &compared.motions {
+        let ratio = motion.tip_max.unwrap() / found.observables.tip_max;
+        assert!((ratio - 1.0).abs() < 0.01, "{}: {ratio}", motion.modes);
+    }
+    let laws = ContactLawsStudy::run(&at, &ContactLawsOptions::default(), &control).unwrap();
+    let own = laws.samples[0].orbit.as_ref().unwrap();
+    assert!((own.observables.phase - found.observables.phase).abs() < 1e-6);
 }
 
 /// The search ends at its budget of steps and says how far it came; its result does not depend on the

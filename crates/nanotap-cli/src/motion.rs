@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 
+use nanotap::case::Case;
 use nanotap::case::physical::Kind;
 use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
@@ -38,19 +39,22 @@ pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
 
 /// Formats the observables: tip, gap, contact, force and energy, or one row for each selected
 /// observable.
-pub(crate) fn observed(
-    o: &Observables,
-    chosen: Option<ObservableSet>,
-    units: &Units,
-    beam: bool,
-) -> String {
+pub(crate) fn observed(o: &Observables, chosen: Option<ObservableSet>, case: &Case) -> String {
+    let (units, lever) = (&case.units(), case.cantilever());
+    let lost = match lever {
+        Some(lever) if lever.has_q_control() => "beam damping and Q control",
+        _ => "beam damping",
+    };
     match chosen {
-        Some(chosen) => choice(o, chosen, units),
-        None => format!("{}\n{}", observables(o, units, beam), energy(o, units)),
+        Some(chosen) => choice(o, chosen, units, lost),
+        None => {
+            let table = observables(o, units, lever.is_some());
+            format!("{table}\n{}", energy(o, units, lost))
+        }
     }
 }
 
-fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
+fn choice(o: &Observables, chosen: ObservableSet, units: &Units, lost: &str) -> String {
     let mut table = Table::new([("", Align::Left); 3]);
     let mut balance = String::new();
     for observable in chosen.iter() {
@@ -60,7 +64,7 @@ fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
             Value::Count(count) => vec![count as f64],
             Value::Range(ends) => ends.to_vec(),
             Value::Energies(_) => {
-                balance = energy(o, units);
+                balance = energy(o, units, lost);
                 continue;
             }
         };
@@ -175,8 +179,9 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
     table.render()
 }
 
-/// Formats the energy balance: the work of the drive and the losses, per period.
-fn energy(o: &Observables, units: &Units) -> String {
+/// Formats the energy balance: the work of the drive and the losses, per period; `lost` names what takes
+/// energy from the lever, or gives it.
+fn energy(o: &Observables, units: &Units, lost: &str) -> String {
     let balance = &o.energy_balance;
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
     let mut row = |name: &str, value: f64, in_electronvolts: bool| {
@@ -192,7 +197,7 @@ fn energy(o: &Observables, units: &Units) -> String {
         table.row([name.to_owned(), shown, note.unwrap_or_default()]);
     };
     row("drive work", balance.drive_work, false);
-    row("beam damping", -balance.beam_damping, false);
+    row(lost, -balance.beam_damping, false);
     row("sample damping", -balance.sample_damping, true);
     row("stored", -balance.stored, false);
     let mut text = format!(
@@ -212,9 +217,10 @@ fn energy(o: &Observables, units: &Units) -> String {
 pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> String {
     const SHOWN: usize = 8;
     let mut text = format!(
-        "  {}\n  phase {}, distortion (THD) {} %\n",
+        "  {}\n  phase {}, distortion {} % of the amplitude, {} % of the power\n",
         style::bold("harmonics of the tip deflection and of the force"),
         lag(spectrum.phase, "the drive", 6),
+        number::significant(100.0 * spectrum.distortion(), 4),
         number::significant(100.0 * spectrum.thd, 4),
     );
     let several_tones = spectrum.harmonics.iter().any(|h| h.product.is_some());

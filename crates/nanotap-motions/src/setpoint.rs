@@ -131,7 +131,9 @@ pub struct SetpointReport {
     /// Amplitude A at the setpoint, m.
     #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,
-    /// All distances at which an orbit is at the setpoint, from far to near.
+    /// Distances at which an orbit is at the setpoint, from far to near: on the branches that the approach
+    /// meets and on those of other motions found at the distance that it reaches. A branch that none of
+    /// these meets is missing.
     pub solutions: Vec<SetpointSolution>,
     /// Index in `solutions` of the one that the approach reaches.
     pub chosen: usize,

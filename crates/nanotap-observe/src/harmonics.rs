@@ -182,6 +182,14 @@ impl Spectrum {
     }
 }
 
+impl Spectrum {
+    /// The usual total harmonic distortion: the amplitude outside the drive's frequency over that at it, both
+    /// as root mean squares; infinite for a motion without the drive's frequency.
+    pub fn distortion(&self) -> f64 {
+        (self.thd / (1.0 - self.thd)).sqrt()
+    }
+}
+
 /// The lag φ of `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
 pub fn lag(c: Complex) -> f64 {
     let degrees = -(c * Complex::new(0.0, 1.0)).argument().to_degrees();

@@ -113,7 +113,7 @@ pub enum VolterraError {
         time: f64,
     },
     /// No step, however short, could be certified.
-    #[error("no step from time {time} (gap {gap}) could be certified: {reason}")]
+    #[error("no step from time {time} (gap {gap:.3e}) could be certified: {reason}")]
     Uncertified {
         /// Time at which the refused step starts, in the system's unit of time; in the approximate
         /// flow from the start of the drive period.
@@ -125,9 +125,10 @@ pub enum VolterraError {
     },
     /// The run needs more steps than are allowed.
     #[error(
-        "the limit of {steps} steps was reached at time {time}: the force changes too fast for the \
-         modes, as under a damping that grows without bound in the contact: with \
-         `exponential-damping` raise `decay_length` or lower `damping`"
+        "the limit of {steps} steps was reached at time {time}: the drive's period is too long for the \
+         oscillations of the modes in it, or the force changes too fast for them, as under a damping that \
+         grows without bound in the contact (`exponential-damping`: a larger `decay_length` or a smaller \
+         `damping`)"
     )]
     TooManySteps {
         /// Number of steps taken.
@@ -137,7 +138,7 @@ pub enum VolterraError {
         time: f64,
     },
     /// The law switched endlessly at one instant.
-    #[error("the law switches without end at time {time} (gap {gap})")]
+    #[error("the law switches without end at time {time} (gap {gap:.3e})")]
     Accumulation {
         /// Time of the switches, in the system's unit of time; in the approximate flow from the
         /// start of the drive period.

@@ -287,7 +287,7 @@ fn not_toml(error: &toml::de::Error, text: &str) -> Problem {
     let message = error.message().trim().replace('\n', ", ");
     if message.contains("duplicate key") {
         return Problem::new(place, "duplicate key")
-            .label("first given here")
+            .label("given a second time here")
             .help("keep one of the two");
     }
     Problem::new(place, format!("not TOML: {message}"))

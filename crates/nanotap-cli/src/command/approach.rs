@@ -178,13 +178,14 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         let at = |value| shown(Kind::Length, value);
         text.push_str(&super::branch::failures(branches, at));
     }
-    for p in report.table.iter().filter(|p| p.reason.is_some()).take(2) {
-        text.push_str(&motion::paragraph(&format!(
-            "{} at {}: {}",
-            p.classification.name(),
-            shown(Kind::Length, p.gap),
-            p.reason.as_deref().unwrap_or_default()
-        )));
+    let undecided = report.table.iter().filter_map(|p| {
+        let (motion, gap) = (p.classification.name(), shown(Kind::Length, p.gap));
+        Some(format!("{motion} at {gap}: {}", p.reason.as_deref()?))
+    });
+    // Both ways may be undecided for the same reason.
+    let reasons: BTreeSet<String> = undecided.collect();
+    for reason in reasons.iter().take(2) {
+        text.push_str(&motion::paragraph(reason));
     }
     text
 }

@@ -337,6 +337,8 @@ fn lever_rows(given: &mut Table, view: &Physical) {
                 "in the fluid, at its own frequency"
             } else if measured[k - 1] > 0.0 {
                 "as given"
+            } else if case.has_q_control() {
+                "in the closed loop"
             } else {
                 "by damping in proportion to mass, several times that of real levers in air"
             };
@@ -446,11 +448,15 @@ fn force_rows(table: &mut Table, force: &SampleForce, frequency: f64) {
     }
 }
 
-/// Every distance at which an orbit is at the setpoint.
+/// The distances at which an orbit is at the setpoint, and what may be missing.
 fn setpoint(report: &SetpointReport) -> String {
     let heading = format!("where {}", report.held_value());
     let table = Table::all(&report.solution_table()).render();
-    format!("\n  {}\n{table}", style::bold(&heading))
+    let open = motion::paragraph(
+        "States on branches that the approach does not meet may be missing: `window` over a range of \
+         distances, or `attractors` at one, searches for them.",
+    );
+    format!("\n  {}\n{table}{open}", style::bold(&heading))
 }
 
 fn oscillator(case: &Case, oscillator: &Oscillator, numbers: &Frame<'_>) -> String {

@@ -6,6 +6,7 @@ use nanotap::case::Key;
 use nanotap::case::units::Units;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
+use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::Document;
 use nanotap::study::modes::{ModeTable, ModesStudy, shape_table};
@@ -85,8 +86,14 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
     if let Some(quality) = table.quality.as_ref().filter(|q| q.len() > 1) {
         let value = |(k, q): (usize, &f64)| format!("Q{} = {}", k + 1, number::significant(*q, 4));
         let values: Vec<String> = quality.iter().take(3).enumerate().map(value).collect();
+        let looped = case.cantilever().is_some_and(Cantilever::has_q_control);
+        let place = if looped {
+            "In free flight, under Q control,"
+        } else {
+            "In free flight"
+        };
         text.push_str(&motion::paragraph(&format!(
-            "In free flight {}. Without numbers of their own higher modes are damped in proportion \
+            "{place} {}. Without numbers of their own higher modes are damped in proportion \
              to their mass, which gives them several times the Q of real levers in air: \
              cantilever.Q2, Q3, f2, f3 and k2 take what was measured.",
             values.join(", ")

@@ -192,12 +192,7 @@ fn text(
     }
     text.push_str(&table.render());
     text.push('\n');
-    text.push_str(&motion::observed(
-        &orbit.observables,
-        chosen,
-        &units,
-        model.beam.is_some(),
-    ));
+    text.push_str(&motion::observed(&orbit.observables, chosen, case));
     text.push('\n');
     text.push_str(&motion::spectrum(&orbit.spectrum, orbit.period, &units));
     text.push('\n');

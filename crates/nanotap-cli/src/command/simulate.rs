@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
-use nanotap::model::Model;
 use nanotap::study::fixed_step::FixedStepRun;
 use nanotap::study::one_shot::OneShot;
 use nanotap::study::simulate::{
@@ -58,14 +57,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
     }
     output.study(&case, &report, |report| match report {
-        SimulateReport::Exact(run) => text(&case, &model, &run.motion, &request),
+        SimulateReport::Exact(run) => text(&case, &run.motion, &request),
         SimulateReport::FixedStep(run) => rk4_text(&case, run),
         SimulateReport::OneShot(run) => one_shot_text(&case, &run.motion),
     })
 }
 
-fn text(case: &GivenCase, model: &Model, run: &Simulation, request: &SimulateOptions) -> String {
-    let units = case.units();
+fn text(case: &GivenCase, run: &Simulation, request: &SimulateOptions) -> String {
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
     let _ = writeln!(
@@ -117,8 +115,7 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation, request: &SimulateOpt
     text.push_str(&motion::observed(
         &run.observables,
         request.observables,
-        &units,
-        model.beam.is_some(),
+        case,
     ));
     if let Some(orbit) = &run.orbit {
         let pairs: Vec<[f64; 2]> = orbit.multipliers.iter().map(|m| [m.re, m.im]).collect();

@@ -31,6 +31,9 @@ use serde::{Deserialize, Serialize};
 use crate::figure::calibrate::calibrate_figure;
 use source::{CELSIUS, Measurement, Signal, Stated};
 
+/// Temperature in °C above which a number may have been meant in K.
+const HOT: f64 = 200.0;
+
 /// Sensitivity of the optical lever, m/V.
 pub(crate) const SENSITIVITY: Kind = Kind::new(&KindEntry {
     name: "sensitivity",
@@ -439,6 +442,12 @@ fn settings(
         number(name, amount, Kind::Number).map(|of| of.unwrap_or(0.0))
     };
     let celsius = options.temperature.map(|of| of + CELSIUS);
+    if let Some(celsius) = options.temperature.filter(|of| *of > HOT) {
+        notes.push(format!(
+            "temperature of {celsius} °C, as stated; {celsius} K are {} °C",
+            significant(celsius - CELSIUS, 4)
+        ));
+    }
     let temperature = celsius.or(stated.temperature).unwrap_or_else(|| {
         notes.push(format!("temperature of {ROOM_TEMPERATURE} °C assumed"));
         ROOM_TEMPERATURE + CELSIUS

@@ -118,12 +118,26 @@ impl Channels {
             table: table.name.clone(),
             distance: name(&["distance", "zc", "gap", "gap.tip"]).unwrap_or_default(),
             is_reversed,
-            deflection: name(&["deflection", "force"]).unwrap_or_default(),
+            deflection: name(&READ).unwrap_or_default(),
             spring_constant: noted(table, SPRING_CONSTANT),
             sensitivity: noted(table, SENSITIVITIES[0].1),
-            rows: table.rows(),
+            rows: read_rows(table),
         }
     }
+}
+
+/// Names of what a force curve reads.
+const READ: [&str; 2] = ["deflection", "force"];
+
+/// Number of rows with a deflection or a force; of a table without these, of all rows.
+fn read_rows(table: &Table) -> usize {
+    place_of(table, &READ).map_or_else(
+        || table.rows(),
+        |place| {
+            let is_number = |entry: &&Entry| matches!(entry, Entry::Number(x) if x.is_finite());
+            table.columns[place].1.iter().filter(is_number).count()
+        },
+    )
 }
 
 /// Properties of a table that the request states, so that they are not guessed.
@@ -202,7 +216,15 @@ pub fn prepared(
         }
         guessed_phase |= guess(case, table, &renamed, foreign, stated, &mut notes)?;
         let is_reversed = guess_force_curve(case, table, stated, &mut notes);
-        channels.push(Channels::of(table, &renamed, is_reversed));
+        let of_table = Channels::of(table, &renamed, is_reversed);
+        let unread = table.rows() - of_table.rows;
+        if unread > 0 {
+            let (table, name) = (&table.name, &of_table.deflection);
+            notes.push(format!(
+                "{table}: rows without `{name}`, left out: {unread}"
+            ));
+        }
+        channels.push(of_table);
         for (place, (written, _)) in table.columns.iter().enumerate() {
             if is_chosen(written, &columns) && data::is_length(&Header::of(written), case) {
                 check_volts(table, place, &renamed)?;

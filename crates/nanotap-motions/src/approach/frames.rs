@@ -103,8 +103,8 @@ impl ApproachPoint {
     /// Name of the motion: its period, or its classification.
     fn motion(&self) -> Cell {
         match self.period {
-            Some(period) => format!("period {period}").cell(),
-            None => self.classification.name().cell(),
+            Some(period) if self.reason.is_none() => format!("period {period}").cell(),
+            _ => self.classification.name().cell(),
         }
     }
 }

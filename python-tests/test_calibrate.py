@@ -51,6 +51,13 @@ def test_the_spectrum_is_a_table_and_a_figure(columns):
     assert table.attrs["units"]["density"] == "m^2/Hz"
     np.testing.assert_allclose(table["density"], density(table["frequency"]), rtol=1e-9)
     np.testing.assert_allclose(table["ratio"], 1, rtol=1e-4)
+    # The estimates are a table, too, each with its unit.
+    rows = found.tables["estimates"].set_index("quantity")
+    assert rows.loc["spring constant k", "value"] == found.stiffness.value
+    assert rows.loc["spring constant k", "unit"] == "N/m"
+    assert rows.loc["resonance f0", "low"] == found.frequency.interval[0]
+    assert found.units["stiffness"] == "N/m"
+    assert found.units["frequency"] == "Hz"
     assert isinstance(found.plot(), Figure)
 
 

@@ -180,6 +180,26 @@ def test_a_browser_that_rounds_twice_runs_the_other_module(
     assert observed(page, "amplitude") == pytest.approx(amplitude(regular), rel=1e-12)
 
 
+def test_the_second_part_of_the_module_comes_once_a_study_needs_it(
+    page: Any, site: str
+) -> None:
+    modules: list[str] = []
+    page.on("request", lambda r: modules.append(r.url) if ".wasm" in r.url else None)
+    page.goto(f"{site}#preset=dmt&set.drive.setpoint=0.8")
+    page.wait_for_selector("body[data-rows=done]")
+    page.wait_for_selector("body[data-search=done]")
+    assert [url.rsplit("/", 1)[1] for url in modules] == ["nanotap.wasm"]
+    # Two studies in workers of their own: the second has the module of the first.
+    for study in ("modes", "lever"):
+        page.goto("about:blank")
+        page.goto(f"{site}#preset=dmt&tab={study}&ran=yes")
+        page.wait_for_selector("#tables td")
+    names = [url.rsplit("/", 1)[1] for url in modules]
+    assert "nanotap-second.wasm" in names
+    assert set(names) == {"nanotap.wasm", "nanotap-second.wasm"}
+    assert page.is_hidden("#message")
+
+
 def test_a_link_to_an_opened_case_opens_it_anywhere(
     page: Any, site: str, folder: Path, case_file: Path
 ) -> None:
@@ -289,6 +309,10 @@ def test_it_opens_without_a_network_after_the_first_visit(
     assert observed(page, "amplitude") == before
     opened(page, f"{address}index.html#preset=paper&set.omega=3.1")
     assert observed(page, "amplitude") != before
+    # With the part that studies need.
+    opened(page, f"{address}#preset=paper&tab=modes&ran=yes")
+    page.wait_for_selector("#tables td")
+    assert page.is_hidden("#message")
 
 
 def test_it_can_be_installed(page: Any, site: str) -> None:

@@ -376,7 +376,17 @@ impl<'a> Parser<'a> {
         let (token, place) = self.next();
         self.nodes.place = place.clone();
         match token {
-            Token::Number(value) => Ok(self.nodes.number(value)),
+            Token::Number(value) => {
+                let (next, place) = self.tokens[self.at].clone();
+                if let Token::Name(word) = next
+                    && !["then", "else", "and", "or"].contains(&word.as_str())
+                {
+                    let reason = "an operator such as `*` is missing before it; a number has no unit: \
+                                  give a parameter with its unit";
+                    return Err(self.error(place, reason));
+                }
+                Ok(self.nodes.number(value))
+            }
             Token::Sign("(") => {
                 let inner = self.deeper(Self::sum)?;
                 self.expect(")", "a parenthesis is open: `)` is missing")?;

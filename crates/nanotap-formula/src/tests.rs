@@ -259,6 +259,7 @@ fn mistakes_are_pointed_at() {
         ("k*(d", 5, "`)` is missing"),
         ("2 k", 3, "an operator such as `*` is missing"),
         ("k d", 3, "an operator"),
+        ("if d < 2 then 1 nN else 0", 17, "a number has no unit"),
         ("k*", 3, "missing at the end"),
         ("k*/d", 3, "needed before `/`"),
         ("d > 1", 3, "a comparison belongs between"),

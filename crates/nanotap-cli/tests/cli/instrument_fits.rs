@@ -412,7 +412,7 @@ fn the_header_is_the_lever_unless_the_case_states_another() {
         "measuredHeight",
         "hertz, tip radius 5 µm, Poisson's ratio 0.5",
         "approach, 800 rows",
-        "k = 50 mN/m from the file's header; InvOLS 50.00 nm/V",
+        "k = 50 mN/m from the file's header; InvOLS 50 nm/V",
     ] {
         assert!(text.stdout.contains(words), "{words} in {}", text.stdout);
     }

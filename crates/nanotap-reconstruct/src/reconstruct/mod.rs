@@ -39,6 +39,7 @@ use nanotap_fit::fit::instrument::{self, wrapped};
 use nanotap_motions::approach::Way;
 use nanotap_motions::frequency_modulation::average::sader_jarvis;
 use nanotap_observe::frame::Frame;
+use nanotap_quantity::number::significant;
 use nanotap_study::Study;
 use nanotap_study::value::Amount;
 
@@ -47,6 +48,8 @@ use lever::{Lever, Method};
 use nodes::Kernel;
 use rows::{Excitation, Kind, Readings, floors};
 
+/// Standard errors of a row's phase by which the phase of free rows may change.
+const DRIFT: f64 = 3.0;
 /// Fewest rows that feel the sample.
 const MIN_ROWS: usize = 8;
 /// Number of such rows below which a warning is given.
@@ -135,7 +138,7 @@ impl Study for ReconstructStudy {
     type Report = ReconstructReport;
 
     fn frames<'a>(_: &Case, report: &'a ReconstructReport) -> Vec<Frame<'a>> {
-        vec![report.force_table()]
+        vec![report.force_table(), report.summary_table()]
     }
 
     fn figure(_: &Case, report: &ReconstructReport) -> Option<Figure> {
@@ -270,6 +273,17 @@ impl Prepared {
             options.phase_error,
         ];
         let errors = errors(given, scatter, least, ["amplitude_error", "phase_error"])?;
+        if let (None, Some(level)) = (options.free_phase, level)
+            && level.drift.abs() > DRIFT * errors[1]
+        {
+            remarks.push(format!(
+                "the phase changes by {}° over the {} rows whose median, {}°, is taken as free: if the \
+                 sample acts there, the dissipation is wrong; give free_phase, or rows farther away",
+                significant(level.drift.abs(), 2),
+                level.rows,
+                significant(level.phase, 5)
+            ));
+        }
         for row in &mut readings.rows {
             row.values[1] = lever.free_phase + wrapped(row.values[1] - phase);
         }

@@ -164,10 +164,16 @@ impl Readings {
     /// with it.
     pub(super) fn free_level(&self) -> Option<FreeLevel> {
         let mut free: Vec<Reading> = Vec::new();
+        let mut drift: f64 = 0.0;
         for segment in self.segments() {
             let mut rows = segment.to_vec();
             rows.sort_by(|a, b| b.distance.total_cmp(&a.distance));
-            free.extend(&rows[..free_rows(&rows)]);
+            let rows = &rows[..free_rows(&rows)];
+            let own = phase_drift(rows);
+            if own.abs() > drift.abs() {
+                drift = own;
+            }
+            free.extend(rows);
         }
         if free.len() < MIN_FREE {
             return None;
@@ -182,6 +188,7 @@ impl Readings {
         Some(FreeLevel {
             amplitude,
             phase: shown_phase(reference + turn),
+            drift,
             rows: free.len(),
         })
     }
@@ -252,8 +259,29 @@ pub(super) struct FreeLevel {
     pub(super) amplitude: f64,
     /// Median phase lag, degrees.
     pub(super) phase: f64,
+    /// By how much the phase changes over the rows of a segment, by a straight line, degrees: the largest.
+    pub(super) drift: f64,
     /// Number of rows with this level.
     pub(super) rows: usize,
+}
+
+/// By how much the phase changes over rows, by a straight line, degrees.
+fn phase_drift(rows: &[Reading]) -> f64 {
+    let Some(first) = rows.first() else {
+        return 0.0;
+    };
+    let points: Vec<[f64; 2]> = rows
+        .iter()
+        .map(|row| [row.distance, wrapped(row.values[1] - first.values[1])])
+        .collect();
+    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
+    let centre = [mean(0), mean(1)];
+    let sum = |of: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(of).sum::<f64>();
+    let square = sum(&|p| (p[0] - centre[0]).powi(2));
+    let slope = sum(&|p| (p[0] - centre[0]) * (p[1] - centre[1])) / square;
+    let span = points[points.len() - 1][0] - points[0][0];
+    let drift = slope * span;
+    if drift.is_finite() { drift } else { 0.0 }
 }
 
 /// How many of the rows, the farthest first, are free: those before the amplitude leaves its

@@ -254,9 +254,7 @@ def test_a_late_answer_does_not_take_the_slider(page: Any, address: str) -> None
     assert all(high > low for high, low in itertools.pairwise(seen)), seen
 
 
-def test_a_slider_is_dragged_for_long(
-    page: Any, address: str, tmp_path: Path
-) -> None:
+def test_a_slider_is_dragged_for_long(page: Any, address: str, tmp_path: Path) -> None:
     opened(page, address, "preset=dmt&set.modes=3&set.drive.setpoint=0.8")
     until(page, lambda: "A click sets" in words(page, "#curve-words"))
     page.complaints.clear()

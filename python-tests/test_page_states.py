@@ -227,6 +227,8 @@ def test_every_law_shows_the_terminals_states(
 
 def test_each_law_is_in_one_family(page: Any, address: str) -> None:
     states(page, address, "")
+    # The fields come with the motion, which may be answered after the rows.
+    page.wait_for_selector("#choose-law option", state="attached")
     offered = page.locator("#choose-law option").evaluate_all(
         "(all) => all.map((one) => one.value)"
     )

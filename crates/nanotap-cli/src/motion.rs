@@ -45,13 +45,11 @@ pub(crate) fn observed(o: &Observables, chosen: Option<ObservableSet>, case: &Ca
         Some(lever) if lever.has_q_control() => "beam damping and Q control",
         _ => "beam damping",
     };
-    match chosen {
-        Some(chosen) => choice(o, chosen, units, lost),
-        None => {
-            let table = observables(o, units, lever.is_some());
-            format!("{table}\n{}", energy(o, units, lost))
-        }
+    if let Some(chosen) = chosen {
+        return choice(o, chosen, units, lost);
     }
+    let table = observables(o, units, lever.is_some());
+    format!("{table}\n{}", energy(o, units, lost))
 }
 
 fn choice(o: &Observables, chosen: ObservableSet, units: &Units, lost: &str) -> String {

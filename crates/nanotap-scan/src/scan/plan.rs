@@ -125,12 +125,11 @@ impl Plan {
         let free_amplitude = view.free_amplitude;
         let setpoint = setpoint(&options, view)?;
         let mode = options.mode.unwrap_or_default();
-        let (z0, start) = match length(options.z0.as_ref(), "z0")? {
-            Some(z0) => (z0, None),
-            None => {
-                let (distance, state) = found_start(case, setpoint, control)?;
-                (distance, Some(state))
-            }
+        let (z0, start) = if let Some(z0) = length(options.z0.as_ref(), "z0")? {
+            (z0, None)
+        } else {
+            let (distance, state) = found_start(case, setpoint, control)?;
+            (distance, Some(state))
         };
         let (integral_gain, gains) = gains(&options, frequency)?;
         let surface = surface(&options, case, [size, size_y])?;

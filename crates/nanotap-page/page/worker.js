@@ -24,10 +24,11 @@ const imports = { nanotap: {
   panicked: (start, length) => { panic = text(start, length); },
 } };
 
-onmessage = ({ data: { module, path, body, ...own } }) => {
+onmessage = ({ data }) => {
+  const { module, path, body } = data;
   try {
-    ({ address } = own);
-    second ??= own.second;
+    address = data.address;
+    second ??= data.second;
     core ??= new WebAssembly.Instance(module, imports).exports;
     const [name, rest] = [path, body].map((words) => encoder.encode(words));
     const length = name.length + rest.length;

@@ -7,6 +7,7 @@ const TOO_OLD = "this browser cannot run nanotap, which needs WebAssembly with S
 const workers = new Map();
 let compiled = null;
 let second = null;            // the part of the module that is loaded on demand, once a worker has loaded it
+let place = "";               // its address
 
 /** Sends a request. Passes the lines of a streamed answer to `line`, if given; returns whether the request
  *  was answered, the media type and the bytes; those of a refusal are JSON. */
@@ -18,7 +19,7 @@ export async function send(path, body, signal, line = () => {}) {
   if (!workers.has(name)) workers.set(name, new Queue());
   const queue = workers.get(name);
   return new Promise((fulfil, refuse) => {
-    const request = { message: { module, path, body: body === undefined ? "" : JSON.stringify(body), address: `./${moduleName()}-second.wasm` }, line, fulfil, refuse };
+    const request = { message: { module, path, body: body === undefined ? "" : JSON.stringify(body) }, line, fulfil, refuse };
     signal.addEventListener("abort", () => { queue.drop(request); refuse(signal.reason); });
     queue.add(request);
   });
@@ -37,7 +38,7 @@ class Queue {
   begin() {
     if (!this.requests.length) return;
     this.worker ??= this.started();
-    this.worker.postMessage({ ...this.requests[0].message, second });
+    this.worker.postMessage({ ...this.requests[0].message, second, address: place });
   }
 
   started() {
@@ -123,6 +124,7 @@ async function load() {
     const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
     return WebAssembly.compile(await new Response(plain).arrayBuffer()).catch(notCompiled);
   }
+  place = `./${name}-second.wasm`;
   const answer = await fetch(`./${name}.wasm`).catch(() => { throw new Error("no network: open the page again when there is one"); });
   if (!answer.ok) throw new Error(`${name}.wasm cannot be loaded: ${answer.status} ${answer.statusText}`);
   // Some hosts send another media type, from which nothing is compiled while it comes.

@@ -72,8 +72,10 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     let [fused, exact] = [MultiplyAdd::Kept, MultiplyAdd::Called]
         .map(|multiply_add| exact::rewritten(&compiled, multiply_add));
     let (fused, exact) = (fused?, exact?);
-    let [fused_parts, exact_parts] = [&fused, &exact].map(|module| split::split(module, is_late));
-    let (fused_parts, exact_parts) = (fused_parts?, exact_parts?);
+    let [fused, exact] = [
+        split::split(&fused, is_late)?,
+        split::split(&exact, is_late)?,
+    ];
     let mut texts = BTreeMap::new();
     let listing = fs::read_dir(&source).map_err(of(&source))?;
     for path in listing.flatten().map(|entry| entry.path()) {
@@ -84,17 +86,13 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     let index = texts.entry(single::INDEX.into()).or_default();
     let closed = format!("{}{}", first_states(), single::END);
     *index = replaced(single::INDEX, index, single::END, &closed)?;
-    let whole = single::page(
-        &texts,
-        &split::without_names(&fused)?,
-        &split::without_names(&exact)?,
-    )?;
+    let whole = single::page(&texts, &fused.whole, &exact.whole)?;
     // Another version of any file is another version of the page, which browsers then load anew.
     let mut hash = Sha256::new();
     for text in texts.values() {
         hash.update(text);
     }
-    hash.update(&fused);
+    hash.update(&fused.whole);
     let version = format!("\"{}\"", STANDARD.encode(hash.finalize()));
     let names = texts.keys().map(String::as_str);
     let names = names.filter(|name| ![single::INDEX, WORKER].contains(name));
@@ -104,10 +102,10 @@ fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageErro
     *worker = replaced(WORKER, worker, FILES, &files)?;
     fs::create_dir_all(folder).map_err(of(folder))?;
     let modules = [
-        ("nanotap.wasm", &fused_parts.first),
-        ("nanotap-second.wasm", &fused_parts.second),
-        ("nanotap-exact.wasm", &exact_parts.first),
-        ("nanotap-exact-second.wasm", &exact_parts.second),
+        ("nanotap.wasm", &fused.first),
+        ("nanotap-second.wasm", &fused.second),
+        ("nanotap-exact.wasm", &exact.first),
+        ("nanotap-exact-second.wasm", &exact.second),
     ];
     let texts = texts
         .iter()

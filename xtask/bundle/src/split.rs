@@ -29,8 +29,10 @@ const MEMORY: &str = "memory";
 /// The name of the table.
 const TABLE: &str = "table";
 
-/// Both parts of a module.
+/// A module in one part and in two, without the names of its functions.
 pub(crate) struct Parts {
+    /// The module in one part.
+    pub(crate) whole: Vec<u8>,
     /// What is loaded first.
     pub(crate) first: Vec<u8>,
     /// What is loaded on demand.
@@ -43,37 +45,43 @@ pub(crate) struct Parts {
 /// If it is no module that the compiler makes.
 pub(crate) fn split(module: &[u8], late: impl Fn(&str) -> bool) -> Result<Parts, ModuleError> {
     let outline = Outline::read(module)?;
-    let late = outline.late(late)?;
-    let mut second = Second::new(&outline, &late);
-    let second_part = second.written(module)?;
+    let Late { functions, called } = outline.late(late)?;
+    // The names have done their duty.
+    let whole = encoded(&mut Nameless, module)?;
     let mut first = First {
         outline: &outline,
-        slots: late
+        slots: functions
             .iter()
             .copied()
             .zip(outline.table.initial as u32..)
             .collect(),
-        functions: second.functions,
+        called: &called,
         body: outline.imported,
     };
-    let mut out = Module::new();
-    utils::parse_core_module(&mut first, &mut out, Parser::new(0), module)?;
+    let mut second = Second {
+        outline: &outline,
+        late: &functions,
+        called: &called,
+        indices: called.iter().chain(&functions).copied().zip(0..).collect(),
+    };
     Ok(Parts {
-        first: out.finish(),
-        second: second_part,
+        first: encoded(&mut first, &whole)?,
+        second: second.written(&whole)?,
+        whole,
     })
 }
 
-/// A module without the names of its functions.
-///
-/// # Errors
-/// If it is no module.
-pub(crate) fn without_names(module: &[u8]) -> Result<Vec<u8>, ModuleError> {
+/// A module written again.
+fn encoded(
+    encoder: &mut impl Reencode<Error = Infallible>,
+    module: &[u8],
+) -> Result<Vec<u8>, ModuleError> {
     let mut out = Module::new();
-    utils::parse_core_module(&mut Nameless, &mut out, Parser::new(0), module)?;
+    utils::parse_core_module(encoder, &mut out, Parser::new(0), module)?;
     Ok(out.finish())
 }
 
+/// Leaves the names out.
 struct Nameless;
 
 impl Reencode for Nameless {
@@ -201,8 +209,8 @@ impl<'a> Outline<'a> {
         &self.bodies[(function - self.imported) as usize]
     }
 
-    /// The functions of the second part, in ascending order.
-    fn late(&self, named: impl Fn(&str) -> bool) -> Result<Vec<u32>, ModuleError> {
+    /// The functions of the second part.
+    fn late(&self, named: impl Fn(&str) -> bool) -> Result<Late, ModuleError> {
         let own = self.imported..self.types.len() as u32;
         let mut late: HashSet<u32> = own
             .clone()
@@ -230,10 +238,21 @@ impl<'a> Outline<'a> {
             }
         }
         late.remove(&self.load);
-        let mut late: Vec<u32> = late.into_iter().collect();
-        late.sort_unstable();
-        Ok(late)
+        let calls = |(function, of): (&u32, &Vec<u32>)| {
+            let is_called = of.iter().any(|caller| late.contains(caller));
+            (is_called && !late.contains(function)).then_some(*function)
+        };
+        let called = callers.iter().filter_map(calls).collect();
+        let mut functions: Vec<u32> = late.into_iter().collect();
+        functions.sort_unstable();
+        Ok(Late { functions, called })
     }
+}
+
+/// The functions of the second part, and those of the first that they call, in ascending order.
+struct Late {
+    functions: Vec<u32>,
+    called: Vec<u32>,
 }
 
 /// Under this name the first part exports a function, and the second imports it.
@@ -252,7 +271,7 @@ struct First<'a> {
     /// The entry of the table of each function that is late.
     slots: HashMap<u32, u32>,
     /// The functions that the second part calls.
-    functions: Vec<u32>,
+    called: &'a [u32],
     /// The function whose body comes next.
     body: u32,
 }
@@ -266,15 +285,6 @@ impl First<'_> {
 
 impl Reencode for First<'_> {
     type Error = Infallible;
-
-    /// The names have done their duty.
-    fn parse_custom_section(
-        &mut self,
-        _: &mut Module,
-        _: wasmparser::CustomSectionReader<'_>,
-    ) -> Result<(), Error<Infallible>> {
-        Ok(())
-    }
 
     fn table_type(&mut self, ty: wasmparser::TableType) -> Result<TableType, Error<Infallible>> {
         let room = self.slots.len() as u64;
@@ -306,7 +316,7 @@ impl Reencode for First<'_> {
     ) -> Result<(), Error<Infallible>> {
         utils::parse_export_section(self, exports, section)?;
         exports.export(TABLE, ExportKind::Table, 0);
-        for function in &self.functions {
+        for function in self.called {
             exports.export(&function_name(*function), ExportKind::Func, *function);
         }
         for index in 0..self.outline.globals.len() {
@@ -353,37 +363,13 @@ struct Second<'a> {
     outline: &'a Outline<'a>,
     late: &'a [u32],
     /// The functions of the first part that it calls.
-    functions: Vec<u32>,
+    called: &'a [u32],
     /// The index in the second part of a function of the module.
     indices: HashMap<u32, u32>,
 }
 
-impl<'a> Second<'a> {
-    fn new(outline: &'a Outline<'a>, late: &'a [u32]) -> Self {
-        Self {
-            outline,
-            late,
-            functions: Vec::new(),
-            indices: HashMap::new(),
-        }
-    }
-
+impl Second<'_> {
     fn written(&mut self, module: &[u8]) -> Result<Vec<u8>, ModuleError> {
-        let own: HashSet<u32> = self.late.iter().copied().collect();
-        let mut called = HashSet::new();
-        for function in self.late {
-            for operator in self.outline.body(*function).get_operators_reader()? {
-                if let Operator::Call { function_index } = operator? {
-                    called.insert(function_index);
-                }
-            }
-        }
-        self.functions = called.difference(&own).copied().collect();
-        self.functions.sort_unstable();
-        self.indices = (self.functions.iter().chain(self.late))
-            .copied()
-            .zip(0..)
-            .collect();
         let mut out = Module::new();
         let mut types = TypeSection::new();
         for payload in Parser::new(0).parse_all(module) {
@@ -412,7 +398,7 @@ impl<'a> Second<'a> {
 
     fn imports(&mut self) -> Result<ImportSection, ModuleError> {
         let mut imports = ImportSection::new();
-        for function in &self.functions {
+        for function in self.called {
             let ty = EntityType::Function(self.outline.types[*function as usize]);
             imports.import(FIRST, &function_name(*function), ty);
         }
@@ -566,7 +552,7 @@ mod tests {
 
     #[test]
     fn a_module_in_one_part_keeps_all_but_the_names() {
-        let whole = without_names(&module()).unwrap();
+        let whole = split(&module(), |_| false).unwrap().whole;
         assert_eq!(bodies(&whole), bodies(&module()));
         assert!(whole.len() < module().len());
     }

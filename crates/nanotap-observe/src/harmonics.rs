@@ -180,9 +180,7 @@ impl Spectrum {
             first_harmonic: first.modulus(),
         }
     }
-}
 
-impl Spectrum {
     /// The usual total harmonic distortion: the amplitude outside the drive's frequency over that at it, both
     /// as root mean squares; infinite for a motion without the drive's frequency.
     pub fn distortion(&self) -> f64 {

@@ -183,9 +183,12 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         Some(format!("{motion} at {gap}: {}", p.reason.as_deref()?))
     });
     // Both ways may be undecided for the same reason.
-    let reasons: BTreeSet<String> = undecided.collect();
-    for reason in reasons.iter().take(2) {
-        text.push_str(&motion::paragraph(reason));
+    let mut said = BTreeSet::new();
+    for reason in undecided
+        .filter(|reason| said.insert(reason.clone()))
+        .take(2)
+    {
+        text.push_str(&motion::paragraph(&reason));
     }
     text
 }

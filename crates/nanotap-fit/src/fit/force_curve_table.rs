@@ -11,12 +11,9 @@ use crate::calibrate::SENSITIVITY;
 /// What no curve has is left out.
 pub fn force_curve_table(curves: &[FittedForceCurve]) -> Frame<'_> {
     let some = |has: fn(&FittedForceCurve) -> bool| curves.iter().any(has);
-    let mut rows = Rows::new("force_curves", curves, None).column(
-        "curve",
-        "",
-        nanotap_observe::frame::Form::Plain,
-        |of| &of.curve,
-    );
+    let mut rows = columns! { Rows::new("force_curves", curves, None);
+        "curve", "", Plain => |of| &of.curve;
+    };
     if some(|of| of.modulus.is_some()) {
         let modulus = |of: &FittedForceCurve| of.modulus;
         rows = columns! { rows;

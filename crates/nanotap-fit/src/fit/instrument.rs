@@ -219,10 +219,7 @@ pub fn prepared(
         let of_table = Channels::of(table, &renamed, is_reversed);
         let unread = table.rows() - of_table.rows;
         if unread > 0 {
-            let (table, name) = (&table.name, &of_table.deflection);
-            notes.push(format!(
-                "{table}: rows without `{name}`, left out: {unread}"
-            ));
+            notes.push(rows_left_out(&table.name, &of_table.deflection, unread));
         }
         channels.push(of_table);
         for (place, (written, _)) in table.columns.iter().enumerate() {
@@ -270,10 +267,14 @@ fn leave_out_rows(case: &Case, table: &mut Table, columns: &[String], notes: &mu
         let count = is_given.iter().filter(|is_given| !**is_given).count();
         if count > 0 {
             table.retain_rows(|row| is_given[row]);
-            let (table, name) = (&table.name, &header.name);
-            notes.push(format!("{table}: rows without `{name}`, left out: {count}"));
+            notes.push(rows_left_out(&table.name, &header.name, count));
         }
     }
+}
+
+/// Says how many rows of a table have no entry in a column.
+fn rows_left_out(table: &str, column: &str, count: usize) -> String {
+    format!("{table}: rows without `{column}`, left out: {count}")
 }
 
 /// A deflection in a unit of force is the force.

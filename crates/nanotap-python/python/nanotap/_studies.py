@@ -752,8 +752,8 @@ def calibrate(
             raise ValueError(message)
         path, table = None, json.dumps(found[0])
     core = _nanotap.calibrate(path, table, json.dumps(request))
-    about = (None, ("calibrate", ""))
-    return Report(json.loads(core.document), Answer(core), *about)
+    document = json.loads(core.document)
+    return Report(document, Answer(core), None, ("calibrate", ""))
 
 
 @stoppable()

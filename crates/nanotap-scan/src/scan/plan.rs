@@ -371,14 +371,11 @@ fn found_start(
         "gap.tip=".to_owned(),
     ];
     let case = case.restated(&words)?;
-    let (found, report) = at_setpoint(case.cancelled_by(control), control)
+    let (found, _) = at_setpoint(case.cancelled_by(control), control)
         .map_err(|error| error.context("z0 is not given"))?;
+    // It starts where its setpoint was found.
     let model = found.model()?;
-    let motion = report.and_then(|report| {
-        let chosen = report.solutions.into_iter().nth(report.chosen)?;
-        Some(chosen.state)
-    });
-    let motion = motion.unwrap_or_else(|| model.rest());
+    let motion = model.first_state();
     let kept = RecordOptions {
         recorded: 1,
         ..RecordOptions::default()

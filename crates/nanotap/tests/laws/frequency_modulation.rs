@@ -413,8 +413,8 @@ fn a_shift_has_its_distances() {
     assert!((force / one.modulation.unwrap().drive_strength - 1.0).abs() < 1e-14);
 }
 
-/// The distances of a shift are the same for any points of the curve, those beside the lowest shift, between
-/// which few points see nothing, included.
+/// The distances of a shift do not depend on the points of the curve. Few points have none near the lowest
+/// shift; the two distances beside it are found all the same.
 #[test]
 fn the_distances_of_a_shift_do_not_depend_on_the_points() {
     let case = air(10.0, 11.0, &DMT);

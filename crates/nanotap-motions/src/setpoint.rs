@@ -12,19 +12,22 @@
 //!
 //! Then the lever goes on to the sample's own position and back to the chosen distance: the other
 //! stable orbits there are reported too, and, from the branches of all these continued round
-//! their folds, the other orbits at the setpoint.
+//! their folds, the other orbits at the setpoint. So are, at some distances, the branches that averaging
+//! knows, and under piecewise-linear forces those to which motions with the amplitude of the setpoint and
+//! several phases lead: a repulsive state far from the attractive one that the approach reaches is found
+//! by them.
 //!
 //! A setpoint that is a frequency shift is one of frequency modulation ([`frequency_modulation`]):
 //! amplitude and phase are held too, at those of the free lever and 90°, and the first distance on
 //! approach at which the shift has its value is chosen. Frequency and strength of the drive there take
 //! the place of the case's own.
 //!
-//! Fails by omission: orbits on other branches, and a setpoint that the quantity passes twice between
+//! Fails by omission: orbits on branches that none of these meets, and a setpoint that the quantity passes twice between
 //! two neighbouring orbits of a branch.
 
 use nanotap_dynamics::{
     BranchPoint, ContinuationOptions, Control, DiagramOptions, PeriodicOrbit, ShootingOptions,
-    assemble_diagram, close_orbit_from_points,
+    assemble_diagram, close_orbit, close_orbit_from_points,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -58,6 +61,8 @@ mod states;
 pub use margin::end_at_setpoint;
 pub use near::{NearOrbit, orbit_at_setpoint};
 pub use states::{SetpointStates, StateSearch, Undecided, states_at_setpoint};
+
+use states::{Expected, Starts};
 
 /// A distance at which an orbit has the setpoint amplitude.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -132,8 +137,8 @@ pub struct SetpointReport {
     #[schemars(extend("x-unit" = "m"))]
     pub amplitude: f64,
     /// Distances at which an orbit is at the setpoint, from far to near: on the branches that the approach
-    /// meets and on those of other motions found at the distance that it reaches. A branch that none of
-    /// these meets is missing.
+    /// meets, and on those that averaging knows, or motions of several phases lead to, at distances of about
+    /// the setpoint's amplitude. A branch that none of these meets is missing.
     pub solutions: Vec<SetpointSolution>,
     /// Index in `solutions` of the one that the approach reaches.
     pub chosen: usize,
@@ -298,7 +303,16 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     sweep.allow_steps(OTHERS_STEPS);
     let (_, place) = sweep.way(place, 0.0, |_, _| false);
     sweep.way(place, reached.gap, |_, _| false);
-    let budget = sweep.spent_budget().map(budget_text);
+    let budget = sweep.spent_budget();
+    // What the approach does not meet, as a repulsive state far from the attractive one that it reaches.
+    sweep.allow_steps(OTHERS_STEPS);
+    let expected = Expected {
+        free,
+        amplitude: reached.observables.first_harmonic,
+    };
+    let starts = Starts::WhereNotAveraged;
+    expected.follow_near(&mut sweep, reached.gap, starts, SETPOINT_PERIODS, control)?;
+    let budget = budget.or(sweep.spent_budget()).map(budget_text);
     sweep.allow_steps(u64::MAX);
     let (mut solutions, other_states) = search.others(&sweep, Some(&reached), reached.gap, control);
     if control.is_cancelled() {
@@ -1248,16 +1262,39 @@ impl Search<'_> {
             let Some(solution) = self.crossing(sweep, &pair[0], &pair[1]) else {
                 continue;
             };
-            let near = 1e-9 * self.free.reach.max(solution.gap.abs());
-            let known = |s: &SetpointSolution| {
-                s.period == solution.period
-                    && (s.gap - solution.gap).abs() <= near
-                    && (s.observables.phase - solution.observables.phase).abs() < 1e-4
-            };
+            let known = |s: &SetpointSolution| self.is_same_crossing(sweep, s, &solution);
             if !solutions.iter().chain(reached).any(known) {
                 solutions.push(solution);
             }
         }
+    }
+
+    /// Whether two orbits at the setpoint are one, found twice. Where the held quantity hardly changes with
+    /// the distance, as far from the sample, rounding alone moves the distance at which it has its value:
+    /// the orbit halfway is then at the setpoint, too.
+    fn is_same_crossing(
+        &self,
+        sweep: &DistanceSweep<'_>,
+        a: &SetpointSolution,
+        b: &SetpointSolution,
+    ) -> bool {
+        let reach = self.free.reach.max(b.gap.abs());
+        let apart = (a.gap - b.gap).abs();
+        let alike = (a.observables.phase - b.observables.phase).abs() < 1e-4;
+        if a.period != b.period || !alike || apart > SAME_DISTANCE * reach {
+            return false;
+        }
+        let halfway = || {
+            let gap = 0.5 * (a.gap + b.gap);
+            let model = sweep.model(gap).ok()?;
+            let mut map = ModelMap::new(&model);
+            let options = ShootingOptions::default();
+            let orbit = close_orbit(&mut map, &a.state, a.period, &options).ok()?;
+            Some(value_at(&self.held, sweep, gap, &orbit))
+        };
+        let at_setpoint =
+            |value: f64| (value - self.held.target).abs() <= SAME_VALUE * self.held.target.abs();
+        apart <= CERTAINLY_SAME * reach || halfway().is_some_and(at_setpoint)
     }
 
     /// A stable orbit at the chosen distance, measured.
@@ -1275,6 +1312,14 @@ impl Search<'_> {
         })
     }
 }
+
+/// Distances over the reach, or the larger distance, within which two orbits are one; and within which they
+/// can be.
+const CERTAINLY_SAME: f64 = 1e-9;
+const SAME_DISTANCE: f64 = 1e-3;
+/// Relative error of the held quantity within which the orbit between two is at the setpoint: some ten times
+/// that to which an orbit at the setpoint is closed.
+const SAME_VALUE: f64 = 1e-11;
 
 /// Steps of regula falsi at most.
 const STEPS: usize = 60;

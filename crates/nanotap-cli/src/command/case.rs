@@ -453,8 +453,8 @@ fn setpoint(report: &SetpointReport) -> String {
     let heading = format!("where {}", report.held_value());
     let table = Table::all(&report.solution_table()).render();
     let open = motion::paragraph(
-        "States on branches that the approach does not meet may be missing: `window` over a range of \
-         distances, or `attractors` at one, searches for them.",
+        "States that neither the approach nor averaging meets may be missing: `window` over a range of \
+         distances, or `attractors` at one, searches for more.",
     );
     format!("\n  {}\n{table}{open}", style::bold(&heading))
 }

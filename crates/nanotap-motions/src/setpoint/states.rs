@@ -133,9 +133,7 @@ pub fn states_at_setpoint(
             .map_or(free.amplitude, |r| r.observables.first_harmonic),
     };
     let expected = Expected { free, amplitude };
-    for distance in [at / amplitude].iter().chain(&DISTANCES) {
-        expected.follow(&mut sweep, distance * amplitude, options, control)?;
-    }
+    expected.follow_near(&mut sweep, at, Starts::All, options.max_period, control)?;
     reasons.extend(spent(&sweep));
     sweep.allow_steps(u64::MAX);
     pieces.extend(inward);
@@ -178,10 +176,19 @@ const DISTANCES: [f64; 3] = [1.0, 0.9, 0.8];
 /// Phase lags behind the drive of these motions, degrees: from strong repulsion to strong attraction.
 const LAGS: [f64; 5] = [30.0, 60.0, 90.0, 120.0, 150.0];
 
+/// Under which forces motions are started to find states.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Starts {
+    /// Under every force.
+    All,
+    /// Under a piecewise-linear one, whose motions averaging does not know.
+    WhereNotAveraged,
+}
+
 /// Motions with the amplitude of the setpoint, near which the states are expected.
-struct Expected {
-    free: FreeMotion,
-    amplitude: f64,
+pub(super) struct Expected {
+    pub(super) free: FreeMotion,
+    pub(super) amplitude: f64,
 }
 
 impl Expected {
@@ -208,25 +215,35 @@ impl Expected {
             .collect()
     }
 
-    /// Continues the branches to which these motions lead at a distance, and those that averaging knows.
-    fn follow(
+    /// Continues the branches to which these motions lead, at the distance where the approach ends and at
+    /// those where the states are expected, and those that averaging knows.
+    pub(super) fn follow_near(
         &self,
         sweep: &mut DistanceSweep<'_>,
-        gap: f64,
-        options: &StateSearch,
+        at: f64,
+        starts: Starts,
+        max_period: usize,
         control: &Control<'_>,
     ) -> Result<(), Error> {
-        let model = sweep.model(gap)?;
-        // What one of these few starts does not decide is left to the others.
-        let found = followed(&model, &self.starts(&model), options, control);
-        let attractors = found.attractors.into_iter();
-        let orbits = attractors.filter_map(|attractor| match attractor.kind {
-            AttractorKind::Periodic(orbit) => Some(orbit),
-            _ => None,
-        });
-        let averaged = averaged_orbits(&model).into_iter();
-        for orbit in orbits.chain(averaged.filter(PeriodicOrbit::is_stable)) {
-            sweep.on(gap, orbit);
+        let expected = DISTANCES.map(|distance| distance * self.amplitude);
+        for gap in [at].into_iter().chain(expected) {
+            let model = sweep.model(gap)?;
+            // Averaging knows the motions under a nonlinear force in a fraction of the time.
+            let starts = match (starts, &model.nonlinear) {
+                (Starts::WhereNotAveraged, Some(_)) => Vec::new(),
+                _ => self.starts(&model),
+            };
+            // What one of these few starts does not decide is left to the others.
+            let found = followed(&model, &starts, max_period, control);
+            let attractors = found.attractors.into_iter();
+            let orbits = attractors.filter_map(|attractor| match attractor.kind {
+                AttractorKind::Periodic(orbit) => Some(orbit),
+                _ => None,
+            });
+            let averaged = averaged_orbits(&model).into_iter();
+            for orbit in orbits.chain(averaged.filter(PeriodicOrbit::is_stable)) {
+                sweep.on(gap, orbit);
+            }
         }
         Ok(())
     }
@@ -236,11 +253,11 @@ impl Expected {
 fn followed(
     model: &Model,
     starts: &[Vec<f64>],
-    options: &StateSearch,
+    max_period: usize,
     control: &Control<'_>,
 ) -> Census {
     let census_options = CensusOptions {
-        classify: short_run(options.max_period),
+        classify: short_run(max_period),
         ..CensusOptions::default()
     };
     let quiet = Control {
@@ -260,7 +277,7 @@ fn sampled(
     let model = sweep.model(gap)?;
     let set = default_starts(&model, options.seed)?;
     let starts: Vec<Vec<f64>> = (0..options.starts).filter_map(|k| set.start(k)).collect();
-    let found = followed(&model, &starts, options, control);
+    let found = followed(&model, &starts, options.max_period, control);
     let mut reasons = Vec::new();
     if !found.undecided.is_empty() || found.transient_chaos.is_some() {
         reasons.push(Undecided::UnclassifiedStart);

@@ -364,3 +364,73 @@ fn a_followed_state_is_the_one_at_the_setpoint() {
     };
     assert!(orbit_at_setpoint(&case(0.8), &wrong).is_err());
 }
+
+/// The lever of the catalogue over polystyrene that attracts (DMT), three modes.
+fn over_polystyrene(setpoint: &str) -> Case {
+    let words = [
+        "cantilever.lever=HQ:NSC14",
+        "cantilever.Q=288.67",
+        "sample.law=dmt",
+        "sample.material=polystyrene",
+        "sample.hamaker=7e-20 J",
+        "drive.frequency_ratio=1",
+        "drive.free_amplitude=10 nm",
+        setpoint,
+    ];
+    let words = words.map(str::to_owned);
+    Case::load(None, &words, &Catalogue::shared()).unwrap()
+}
+
+/// The approach passes from the free to the attractive state and never meets the repulsive one, which
+/// `window` finds from random initial states at each of 28 distances between 8 and 10 nm.
+#[test]
+fn a_state_that_the_approach_does_not_meet_is_found() {
+    let lever = over_polystyrene("drive.setpoint=0.9");
+    let report = solve_setpoint(&lever, &Control::default()).unwrap();
+    let stable = report.solutions.iter().filter(|s| s.stable);
+    let found: Vec<(&str, f64)> = stable.map(|s| (s.branch, 1e9 * s.zc)).collect();
+    let [("attractive", far), ("repulsive", near)] = found[..] else {
+        panic!("{found:?}");
+    };
+    // Both to the digits that a window's report shows.
+    assert!(
+        (far - 9.414).abs() < 1e-3 && (near - 8.62).abs() < 5e-3,
+        "{found:?}"
+    );
+    let repulsive = report
+        .solutions
+        .iter()
+        .find(|s| s.branch == "repulsive" && s.stable);
+    let there = lever.with(lever.gap_key(), repulsive.unwrap().gap);
+    let options = OrbitOptions {
+        state: Some(repulsive.unwrap().state.clone().into()),
+        ..OrbitOptions::default()
+    };
+    let orbit = orbit(&there.model().unwrap(), &options).unwrap();
+    let amplitude = orbit.observables.first_harmonic * lever.physical().unwrap().scales.length;
+    assert!(
+        orbit.stable && (amplitude / 9e-9 - 1.0).abs() < 1e-9,
+        "{amplitude}"
+    );
+}
+
+/// Far from the sample the amplitude hardly depends on the distance, so that rounding moves the distance
+/// of a setpoint; an orbit that is found on two branches is one all the same.
+#[test]
+fn an_orbit_far_from_the_sample_is_listed_once() {
+    let lever = over_polystyrene("drive.setpoint=0.999999");
+    let report = solve_setpoint(&lever, &Control::default()).unwrap();
+    let stable: Vec<f64> = report
+        .solutions
+        .iter()
+        .filter(|s| s.stable)
+        .map(|s| s.zc)
+        .collect();
+    for (k, one) in stable.iter().enumerate() {
+        let others = &stable[k + 1..];
+        assert!(
+            others.iter().all(|other| (other / one - 1.0).abs() > 1e-3),
+            "{stable:?}"
+        );
+    }
+}

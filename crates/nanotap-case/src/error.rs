@@ -67,6 +67,16 @@ pub enum ValueOfKeyError {
         /// Error of parsing the quantity.
         error: Box<QuantityError>,
     },
+    /// A number without a unit, which would be in SI, is one that no instrument has.
+    #[error("{text}: {shown} without a unit; did you mean {meant}?")]
+    Implausible {
+        /// Value as given.
+        text: String,
+        /// Value in SI.
+        shown: String,
+        /// Value in a usual unit.
+        meant: String,
+    },
 }
 
 impl From<CaseError> for nanotap_error::Error {

@@ -64,7 +64,7 @@ pub use stated::{Value, ValueError};
 pub use under_law::LawChange;
 
 use file::{CaseFileError, Described, Source};
-use key::ModelKind;
+use key::{ModelKind, Section, plausible};
 use near_name::near_name;
 use physical::drive::FIRST;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
@@ -804,7 +804,20 @@ impl Case {
                 text: text.to_owned(),
                 error: Box::new(error),
             })?;
-        Ok(value / si)
+        let section = match kind {
+            Kind::Length if !key.is_physical() => Section::Gap,
+            _ => key.section(),
+        };
+        match plausible::meant(section, kind, value) {
+            Some(meant) if text.trim().parse::<f64>().is_ok() => {
+                Err(ValueOfKeyError::Implausible {
+                    text: text.to_owned(),
+                    shown: kind.format(value),
+                    meant,
+                })
+            }
+            _ => Ok(value / si),
+        }
     }
 
     /// Parses a value of a key: a number of the dimensionless model, or for a physical case also a

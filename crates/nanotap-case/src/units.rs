@@ -109,14 +109,10 @@ impl Units {
     }
 
     /// For an axis that holds numbers of the model up to `size`: what they are to be
-    /// multiplied with, and the unit in brackets with a blank before it (empty in the
-    /// model's own units).
+    /// multiplied with, and the unit with the prefix that fits (empty in the model's own units).
     pub fn axis(&self, kind: Kind, size: f64) -> (f64, String) {
-        let Some(si) = self.si(kind) else {
-            return (1.0, String::new());
-        };
-        let (factor, unit) = prefixed(kind, si, size);
-        (factor, format!(" ({unit})"))
+        self.si(kind)
+            .map_or((1.0, String::new()), |si| prefixed(kind, si, size))
     }
 }
 
@@ -161,13 +157,13 @@ mod tests {
     fn axes_take_the_prefix_that_fits() {
         let units = lever().units();
         let (factor, unit) = units.axis(Kind::Length, 0.02);
-        assert_eq!(unit, " (nm)");
+        assert_eq!(unit, "nm");
         // 0.02 of 1 µm is 20 nm.
         assert!((factor * 0.02 - 20.0).abs() < 1e-9);
         let (factor, unit) = units.axis(Kind::Force, 0.005);
-        assert_eq!(unit, " (nN)");
+        assert_eq!(unit, "nN");
         assert!((factor * 0.005 - 5.0).abs() < 1e-9);
-        assert_eq!(units.axis(Kind::Length, 0.0).1, " (m)");
+        assert_eq!(units.axis(Kind::Length, 0.0).1, "m");
         // 3 of 1 ng.
         let (factor, unit) = prefixed(Kind::Mass, 1e-12, 3.0);
         assert_eq!(unit, "ng");

@@ -100,6 +100,9 @@ impl Over {
                 Err(ValueOfKeyError::Quantity { error, .. }) => {
                     Err(wrong(&format_args!("{which}: {error}")))
                 }
+                Err(error @ ValueOfKeyError::Implausible { .. }) => {
+                    Err(wrong(&format_args!("{which}: {error}")))
+                }
             }
         };
         let over = if range.contains(',') && !range.contains(':') {

@@ -48,7 +48,8 @@ pub(super) fn misplaced(document: &Document, problems: &mut Problems) {
             if Section::find(&first.key).is_some() {
                 problem.help(format!("write it as a header: [{}]", first.key))
             } else {
-                problem.help("put a line [model] before it")
+                let table = tables_of(&first.key).next().unwrap_or(Section::Model);
+                problem.help(format!("put a line [{}] before it", table.name()))
             }
         });
     }
@@ -57,6 +58,14 @@ pub(super) fn misplaced(document: &Document, problems: &mut Problems) {
             problems.add(|| unknown_table(&entry.table, &entry.key_place, &entry.table));
         }
     }
+}
+
+/// The tables with a key of this name: those of dimensionless cases first.
+fn tables_of(name: &str) -> impl Iterator<Item = Section> {
+    let named = move |key: &Key| key.name() == name || key.alias() == Some(name);
+    let all = Key::all().filter(named).map(Key::section);
+    let (of_model, physical): (Vec<_>, Vec<_>) = all.partition(|table| *table == Section::Model);
+    of_model.into_iter().chain(physical)
 }
 
 /// A word that is not one of the `allowed` ones.
@@ -114,7 +123,12 @@ pub(super) fn unknown_physical_key(section: Section, entry: &Entry) -> Problem {
         format!("`{key}` (= {}) is not a key of [{table}]", entry.written),
     );
     let names: Vec<&str> = section.keys().map(Key::name).collect();
-    match near_name(key, names.iter().copied()) {
+    if let Some(table) = tables_of(key).find(|table| *table != Section::Model) {
+        return problem.help(format!("it is a key of [{}]", table.name()));
+    }
+    let is_law = section == Section::Sample && key == Key::Contact.name();
+    let near = || near_name(key, names.iter().copied());
+    match is_law.then(|| Key::SampleLaw.name()).or_else(near) {
         Some(meant) => {
             let hint = format!("did you mean `{meant}`?");
             problem.label(hint.clone()).help(hint)
@@ -160,10 +174,12 @@ pub(super) fn mixed(
             ),
         )
         .label("dimensionless")
-        .help(
+        .help(if first.key == Key::Contact.name() {
+            "the law of a physical case is `law` in [sample]"
+        } else {
             "a case is one or the other: with physical tables, [model] holds at most \
-             modes and cosine_term",
-        )
+             modes and cosine_term"
+        })
     });
 }
 

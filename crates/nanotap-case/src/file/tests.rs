@@ -256,6 +256,21 @@ fn every_refusal_says_place_key_value_and_remedy() {
             "c.toml:1:1: `modes` and 7 more keys are outside any table; put a line [model] before it",
         ),
         (
+            "[model]\n",
+            "k = \"2 N/m\"\n[model]\n",
+            "c.toml:1:1: `k` is outside any table; put a line [cantilever] before it",
+        ),
+        (
+            "[model]",
+            "[sample]\ncontact = \"dmt\"\n[model]",
+            "`contact` (= \"dmt\") is not a key of [sample]; did you mean `law`?",
+        ),
+        (
+            "[model]",
+            "[sample]\nfrequency = \"20 kHz\"\n[model]",
+            "`frequency` (= \"20 kHz\") is not a key of [sample]; it is a key of [drive]",
+        ),
+        (
             "[model]",
             "[sample]\nstiffness = \"20 N/m\"\n[model]",
             "`alpha1` and 6 more keys are dimensionless, but [sample] makes this a physical case",

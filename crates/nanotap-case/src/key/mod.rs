@@ -3,6 +3,7 @@
 //! The entries are in `keys`; parsing, checks, sweeps, help and documentation use them.
 
 mod keys;
+pub(crate) mod plausible;
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -30,13 +31,13 @@ use nanotap_model::words::words;
 pub struct Key(u16);
 
 /// The key of a parameter of a formula, with its path.
-struct Named {
+struct FormulaKey {
     entry: Entry,
     path: String,
 }
 
 /// The keys of parameters of formulas, one a name and dimension, for as long as the program runs.
-static NAMED: RwLock<Vec<&'static Named>> = RwLock::new(Vec::new());
+static FORMULA_KEYS: RwLock<Vec<&'static FormulaKey>> = RwLock::new(Vec::new());
 
 words! {
     /// A table of a case file.
@@ -381,9 +382,9 @@ impl Key {
         }
     }
 
-    fn named(self) -> Option<&'static Named> {
+    fn named(self) -> Option<&'static FormulaKey> {
         let number = usize::from(self.0).checked_sub(TABLE.len())?;
-        let named = NAMED.read().unwrap_or_else(PoisonError::into_inner);
+        let named = FORMULA_KEYS.read().unwrap_or_else(PoisonError::into_inner);
         named.get(number).copied()
     }
 
@@ -393,14 +394,14 @@ impl Key {
         let parameter = name.strip_prefix(written::PARAMETERS)?;
         let key =
             Formula::is_name(parameter).then(|| written::key(parameter, kind.dimension()))??;
-        let mut all = NAMED.write().unwrap_or_else(PoisonError::into_inner);
-        let same = |named: &&Named| {
+        let mut all = FORMULA_KEYS.write().unwrap_or_else(PoisonError::into_inner);
+        let same = |named: &&FormulaKey| {
             named.entry.name == key.name && named.entry.takes == Takes::Quantity(key.kind)
         };
         let number = all.iter().position(same).unwrap_or(all.len());
         let index = u16::try_from(TABLE.len() + number).ok()?;
         if number == all.len() {
-            all.push(Box::leak(Box::new(Named {
+            all.push(Box::leak(Box::new(FormulaKey {
                 entry: keys::of_laws(&key),
                 path: format!("{}.{}", Section::Sample.name(), key.name),
             })));

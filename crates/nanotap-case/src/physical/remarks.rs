@@ -4,26 +4,12 @@ use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::TipMass;
 use super::view::{Physical, USUAL_TIP_HEIGHT};
-use crate::key::{Key, Section};
+use crate::key::{Key, plausible};
 use crate::quantity::Kind;
 use crate::stated::Value;
 use nanotap_model::drive_form::Actuation;
 use nanotap_model::exact_beam;
 use nanotap_model::parameter::Parameter;
-
-/// Quantities by section, their values in SI on real instruments, and the unit in which they are
-/// usually given.
-const PLAUSIBLE: [(Section, Kind, [f64; 2], &str); 9] = [
-    (Section::Cantilever, Kind::Stiffness, [0.0, 1e4], "N/m"),
-    (Section::Cantilever, Kind::Frequency, [500.0, 1e8], "kHz"),
-    (Section::Cantilever, Kind::Length, [0.0, 0.05], "um"),
-    (Section::Tip, Kind::Length, [0.0, 1e-3], "nm"),
-    (Section::Tip, Kind::Pressure, [1e3, 2e12], "GPa"),
-    (Section::Sample, Kind::Pressure, [1.0, 2e12], "GPa"),
-    (Section::Drive, Kind::Frequency, [1.0, 1e9], "kHz"),
-    (Section::Drive, Kind::Length, [0.0, 1e-3], "nm"),
-    (Section::Gap, Kind::Length, [0.0, 1e-3], "nm"),
-];
 
 impl Physical {
     /// All remarks, in the order in which the case is read.
@@ -102,16 +88,10 @@ impl Physical {
             let Value::Number(value, kind) = reader.stated.get(key)? else {
                 return None;
             };
-            let rows = PLAUSIBLE.iter();
-            let mut rows = rows.filter(|(section, of, ..)| of == kind && *section == key.section());
-            let (.., [low, high], unit) = rows.next()?;
-            if *value == 0.0 || (*low..=*high).contains(&value.abs()) {
-                return None;
-            }
+            let meant = plausible::meant(key.section(), *kind, *value)?;
             let shown = kind.format(*value);
-            let number = shown.split(' ').next().unwrap_or_default();
             Some(Remark::warning(format!(
-                "{key} is {shown}; did you mean {number} {unit}?"
+                "{key} is {shown}; did you mean {meant}?"
             )))
         })
     }

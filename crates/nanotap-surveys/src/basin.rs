@@ -149,7 +149,7 @@ impl SliceRange {
 
 /// An attractor of a basin dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Known {
+pub struct BasinAttractor {
     /// Class of the motion: `periodic`, `quasi-periodic` or `chaotic`.
     pub classification: String,
     /// Minimal period in drive periods; `None` unless the motion is periodic.
@@ -172,7 +172,7 @@ pub struct Basin {
     wall: Option<Wall>,
     basins: Basins,
     schema: Schema,
-    known: Vec<Known>,
+    known: Vec<BasinAttractor>,
 }
 
 impl Basin {
@@ -183,7 +183,7 @@ impl Basin {
     pub fn new(case: &Case, options: &BasinOptions, control: &Control<'_>) -> Result<Self, Error> {
         for (what, number) in [
             ("0 starts", options.starts),
-            ("0 periods a point", options.periods),
+            ("0 periods a point", options.periods.unwrap_or(1)),
             ("0 as the longest period", options.max_period),
         ] {
             if number == 0 {
@@ -246,13 +246,15 @@ impl Basin {
                     .map_or(String::new(), |(_, reason)| format!(" ({reason})")),
             )));
         }
-        let budget = Budget {
-            max_periods: options.periods,
+        let budget = |attractors: &[Attractor]| Budget {
+            max_periods: options
+                .periods
+                .unwrap_or_else(|| enough_periods(attractors)),
             ..Budget::default()
         };
         let given = options.attractors.is_some();
         let mut attractors = found.attractors;
-        let mut basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
+        let mut basins = Basins::new(&map, slice.clone(), &attractors, budget(&attractors))?;
         // Given states are the only attractors that points are assigned to.
         while !given && !control.is_cancelled() {
             let strangers = strangers(&map, &slice, wall.as_ref(), &basins);
@@ -269,16 +271,17 @@ impl Basin {
             if attractors.len() == before {
                 break;
             }
-            basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
+            basins = Basins::new(&map, slice.clone(), &attractors, budget(&attractors))?;
         }
         if control.is_cancelled() {
             return Err(Error::stopped());
         }
-        let known: Vec<Known> = attractors
+        let known: Vec<BasinAttractor> = attractors
             .iter()
-            .map(|a| Known::of(a, &mut map.clone()))
+            .map(|a| BasinAttractor::of(a, &mut map.clone()))
             .collect();
-        let schema = schema(case, options, [x, y], &names, &basins, &known);
+        let periods = budget(&attractors).max_periods;
+        let schema = schema(case, (options, periods), [x, y], &names, &basins, &known);
         Ok(Self {
             model,
             slice,
@@ -290,7 +293,7 @@ impl Basin {
     }
 
     /// The attractors; a label is an index into them.
-    pub fn attractors(&self) -> &[Known] {
+    pub fn attractors(&self) -> &[BasinAttractor] {
         &self.known
     }
 
@@ -445,7 +448,29 @@ fn starts_in(
     Ok(sides.starts_until(options.seed, options.starts, control))
 }
 
-impl Known {
+/// Drive periods a point is followed at least and at most, unless the options say how many.
+const PERIODS: [usize; 2] = [1000, 100_000];
+/// Factor by which disturbances of the slowest orbit die in this time: from the size of a slice to that of
+/// the neighbourhood in which the orbit is certain to attract.
+const DECAY: f64 = 1e-10;
+
+/// The drive periods in which disturbances of these attractors' orbits die.
+fn enough_periods(attractors: &[Attractor]) -> usize {
+    let slowest = attractors
+        .iter()
+        .filter_map(|attractor| match &attractor.kind {
+            AttractorKind::Periodic(orbit) => {
+                let rate = -nanotap_arithmetic::ln(orbit.spectral_radius()) / orbit.period as f64;
+                Some(-nanotap_arithmetic::ln(DECAY) / rate)
+            }
+            _ => None,
+        });
+    let longest = slowest.filter(|periods| *periods > 0.0).fold(0.0, f64::max);
+    let [least, most] = PERIODS;
+    (longest.min(most as f64) as usize).max(least)
+}
+
+impl BasinAttractor {
     fn of(attractor: &Attractor, map: &mut ModelMap) -> Self {
         let spectrum = |s: &nanotap_dynamics::LyapunovSpectrum| Some(s.largest().0);
         match &attractor.kind {
@@ -501,11 +526,11 @@ fn number(label: Label) -> i32 {
 
 fn schema(
     case: &Case,
-    options: &BasinOptions,
+    (options, periods): (&BasinOptions, usize),
     [x, y]: [&SliceRange; 2],
     names: &[String],
     basins: &Basins,
-    known: &[Known],
+    known: &[BasinAttractor],
 ) -> Schema {
     let rows = (basins.len().div_ceil(CHUNKS)).min(CHUNK_POINTS) / x.count;
     let grid = Grid {
@@ -529,7 +554,7 @@ fn schema(
         "given": options.attractors,
         "starts": options.starts,
         "seed": options.seed,
-        "periods": options.periods,
+        "periods": periods,
         "max_period": options.max_period,
     });
     all.insert("basin".into(), attributes::text(&recipe));
@@ -626,7 +651,7 @@ pub struct AttractorShare {
 }
 
 /// The attractors that a dataset of basins holds.
-pub(crate) fn known(store: &Store) -> Result<Vec<Known>, StoreError> {
+pub(crate) fn known(store: &Store) -> Result<Vec<BasinAttractor>, StoreError> {
     let text = store
         .schema()
         .attributes
@@ -727,9 +752,10 @@ options! {
         /// Seed of the census
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// Drive periods after which a point counts as unsettled
+        /// Drive periods after which a point counts as unsettled; default: enough for the orbit whose
+        /// disturbances die slowest, 1000 at least
         #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
-        pub periods: usize = 1000,
+        pub periods: Option<usize> = None,
         /// Longest period of orbits, in drive periods
         #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 64,

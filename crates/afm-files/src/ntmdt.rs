@@ -4,8 +4,8 @@
 use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, Document, Segment, Style};
 use crate::limits::Budget;
-use crate::table::{Layout, rows};
 use crate::text::{any, number_with_comma};
+use crate::text_table::{Layout, rows};
 use crate::{Error, Format, Limits};
 
 const NAMES: Names = Names {

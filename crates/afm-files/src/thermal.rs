@@ -2,8 +2,8 @@
 
 use crate::document::{Document, Spectrum};
 use crate::limits::{Budget, MAX_CHANNELS, MAX_HEADER, at_most};
-use crate::table::{Layout, rows};
 use crate::text::any;
+use crate::text_table::{Layout, rows};
 use crate::{Error, Format, Limits};
 
 pub(crate) fn read(bytes: &[u8], limits: Limits) -> Result<Document, Error> {

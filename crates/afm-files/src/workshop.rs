@@ -2,8 +2,8 @@
 
 use crate::distance::{Names, finish};
 use crate::document::{Channel, Curve, Document, Segment, Style};
-use crate::table::{Heading, headed};
 use crate::text::{any, number_with_comma};
+use crate::text_table::{Heading, headed};
 use crate::{Error, Format, Limits};
 
 const NAMES: Names = Names {

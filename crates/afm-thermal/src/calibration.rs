@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::error::{positive, require};
 use crate::fit::{Fit, fit, start};
 use crate::foreign::foreign_peaks;
-use crate::lever::ModeFactor;
+use crate::mode_factor::ModeFactor;
 use crate::oscillator::Oscillator;
 use crate::scatter::{BinScatter, robust_averages};
 use crate::spectrum::{Average, Bin, Density, Spectrum, Unit, Window, amplitude_equivalent};

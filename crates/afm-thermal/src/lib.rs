@@ -50,7 +50,7 @@ mod fft;
 mod fit;
 mod fluid;
 mod foreign;
-mod lever;
+mod mode_factor;
 mod oscillator;
 mod sader;
 mod scatter;
@@ -62,7 +62,7 @@ pub use calibration::{BOLTZMANN, Calibration, Options, Sader, Scatter, Sensitivi
 pub use error::Error;
 pub use estimate::Estimate;
 pub use fluid::{Fluid, REYNOLDS, hydrodynamic_function};
-pub use lever::ModeFactor;
+pub use mode_factor::ModeFactor;
 pub use oscillator::density;
 pub use sader::{Plan, ReferenceLever};
 pub use spectrum::{Average, Density, MAX_BINS, Spectrum, Unit, Window};

@@ -17,7 +17,7 @@ use crate::api_error::ApiError;
 use crate::motion_request::{Start, model_of};
 use crate::preset::CaseSpec;
 use crate::readout::regime;
-use crate::row::{Shown, row};
+use crate::row::{RowMotion, row};
 use crate::states::of_orbit;
 
 /// Longest period of the unstable orbits that are searched for.
@@ -58,7 +58,7 @@ pub(crate) fn listed(
                 "amplitude": recorded.observables.amplitude,
                 "shown": shown_observables(&recorded.observables, &case.units()),
                 "exponent": one.lyapunov.first(),
-                "row": row(&Shown {
+                "row": row(&RowMotion {
                     case: &case,
                     model: &model,
                     state: &recorded.state,

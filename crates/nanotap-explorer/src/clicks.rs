@@ -10,7 +10,7 @@ use nanotap::observe::{Dimension, Observable, Observables};
 use nanotap::study::approach::ApproachReport;
 use nanotap::study::branch::{BranchReport, PointReport};
 use nanotap::study::sweep::Over;
-use nanotap_figures::{Colour, Dash, Figure, Line, Panel};
+use nanotap_figures::{Colour, Dash, Figure, Line};
 use serde_json::{Map, Value, json};
 
 use crate::motion_request::Start;
@@ -59,7 +59,7 @@ impl Height {
             .filter_map(|(name, panel)| {
                 Some(Self {
                     observable: Observable::named(name)?,
-                    unit: unit_of(panel),
+                    unit: panel.y.unit.clone(),
                 })
             })
             .collect()
@@ -128,7 +128,7 @@ impl Height {
 /// Factor from an entry of a state to its drawn values.
 pub(crate) fn of_entry(units: &Units, name: &str, axis: &nanotap_figures::Axis) -> f64 {
     let si = units.of_entry(name);
-    si.map_or(1.0, |(kind, si)| factor(kind, si, &unit_on(axis)))
+    si.map_or(1.0, |(kind, si)| factor(kind, si, &axis.unit))
 }
 
 /// What else a click must set, `key: value`, so that the case is the one that was drawn: what stays
@@ -145,25 +145,6 @@ pub(crate) fn fixed(case: &Case, keys: &[Key]) -> Map<String, Value> {
     held.filter(|(path, _)| !distance || *path == Key::GapBeam.path())
         .filter_map(word)
         .collect()
-}
-
-/// The unit of a panel's vertical axis, which may be part of its label.
-fn unit_of(panel: &Panel) -> String {
-    unit_on(&panel.y)
-}
-
-fn unit_on(axis: &nanotap_figures::Axis) -> String {
-    parts(axis).1.to_owned()
-}
-
-/// Label and unit of an axis.
-pub(crate) fn parts(axis: &nanotap_figures::Axis) -> (&str, &str) {
-    if !axis.unit.is_empty() {
-        return (&axis.label, &axis.unit);
-    }
-    let label = axis.label.strip_suffix(')');
-    let parts = label.and_then(|label| label.rsplit_once(" ("));
-    parts.unwrap_or((&axis.label, ""))
 }
 
 /// Factor from values in a unit of `si` in SI to values in `unit`.
@@ -370,10 +351,5 @@ mod tests {
         assert_eq!(conversion("nm", "nN"), None);
         let [joules, volts] = ["aJ", "eV"].map(|unit| factor(Kind::Energy, 1.0, unit));
         assert!((joules / volts - 1e18 * JOULES_PER_ELECTRONVOLT).abs() < 1e-12);
-        let panel = Panel::new(
-            nanotap_figures::Axis::default(),
-            nanotap_figures::Axis::linear("force (pN)"),
-        );
-        assert_eq!(unit_of(&panel), "pN");
     }
 }

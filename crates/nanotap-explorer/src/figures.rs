@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::api_error::ApiError;
-use crate::clicks::{conversion, parts};
+use crate::clicks::conversion;
 
 /// Steps of the colours of a map.
 const SHADES: usize = 64;
@@ -50,8 +50,7 @@ const PINNED: &str = "pinned";
 /// Returns whether there are any.
 pub(crate) fn over_pinned(figure: &mut Figure, pinned: &Figure) -> bool {
     let factor = |one: &Axis, other: &Axis| {
-        let ((label, unit), (of, from)) = (parts(one), parts(other));
-        (label == of).then(|| conversion(from, unit))?
+        (one.label == other.label).then(|| conversion(&other.unit, &one.unit))?
     };
     let mut any = false;
     for (panel, old) in figure.panels.iter_mut().zip(&pinned.panels) {

@@ -77,7 +77,7 @@ pub(crate) type Accepts<'a> = &'a dyn Fn(String) -> bool;
 /// The controls of `case`: every key of its kind, law and drive. The ranges of sliders follow from the
 /// values of `base`, so that a slider does not jump while it is dragged; with `accepts` they end where
 /// values are refused.
-pub(crate) fn of(case: &Case, base: &Case, accepts: Option<Accepts<'_>>) -> Vec<Knob> {
+pub(crate) fn knobs_of(case: &Case, base: &Case, accepts: Option<Accepts<'_>>) -> Vec<Knob> {
     let has = |key: &Key| !case.is_foreign(*key);
     keys(case)
         .filter(has)

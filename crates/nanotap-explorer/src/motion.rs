@@ -155,7 +155,7 @@ pub(crate) fn answer(
         "title": case.title(),
         "summary": motion.words(),
         "remarks": remarks,
-        "keys": knobs::of(&case, &base, accepts),
+        "keys": knobs::knobs_of(&case, &base, accepts),
         "readout": readout(&case, motion.observables()),
         "distance": case.physical().map(|_| Kind::Length.format_digits(case.get(Key::GapTip), 5)),
         "observables": rows(&case, motion.observables()),

@@ -30,7 +30,7 @@ const READ: [&str; 6] = [
 ];
 
 /// A motion that a row shows.
-pub(crate) struct Shown<'a> {
+pub(crate) struct RowMotion<'a> {
     /// The case at the distance of the motion.
     pub(crate) case: &'a Case,
     pub(crate) model: &'a Model,
@@ -47,8 +47,8 @@ pub(crate) struct Shown<'a> {
 
 /// The row of a motion. Numbers are in SI, or in the model's units of a case without units; texts have
 /// four digits and a unit.
-pub(crate) fn row(shown: &Shown<'_>) -> Result<Value, ApiError> {
-    let Shown {
+pub(crate) fn row(shown: &RowMotion<'_>) -> Result<Value, ApiError> {
+    let RowMotion {
         case,
         model,
         state,

@@ -22,7 +22,7 @@ use crate::api_error::ApiError;
 use crate::knobs;
 use crate::motion_request::model_of;
 use crate::preset::CaseSpec;
-use crate::row::{Shown, length_json, row};
+use crate::row::{RowMotion, length_json, row};
 
 /// Parts in which a case is changed where an orbit is not near at once.
 const PARTS: [usize; 3] = [1, 4, 16];
@@ -229,7 +229,7 @@ fn closed(case: &Case, near: &Near) -> Result<Value, ApiError> {
 
 fn of_solution(case: &Case, solution: &SetpointSolution) -> Result<Value, ApiError> {
     let there = case.with(case.gap_key(), solution.gap);
-    row(&Shown {
+    row(&RowMotion {
         case: &there,
         model: &there.model()?,
         state: &solution.state,
@@ -257,7 +257,7 @@ fn at_distance(case: &Case, near: &NearOrbit) -> Result<Value, ApiError> {
 
 /// The row of an orbit.
 pub(crate) fn of_orbit(case: &Case, model: &Model, found: &OrbitReport) -> Result<Value, ApiError> {
-    row(&Shown {
+    row(&RowMotion {
         case,
         model,
         state: &found.state,

@@ -105,13 +105,13 @@ impl Axis {
 
     /// Sets the magnitude of a value that matters: data that are all smaller than 10⁻⁹ of it, or
     /// differ by less, are rounding errors, and the axis shows them as constant.
-    pub fn natural(mut self, size: f64) -> Axis {
-        self.natural = Some(size);
+    pub fn natural(mut self, size: impl Into<Option<f64>>) -> Axis {
+        self.natural = size.into();
         self
     }
 
     /// The label with the unit.
-    pub(crate) fn words(&self) -> String {
+    pub fn words(&self) -> String {
         match (self.label.as_str(), self.unit.as_str()) {
             (label, "") => label.to_owned(),
             ("", unit) => unit.to_owned(),

@@ -25,7 +25,7 @@ fn exponents(dimension: Dimension) -> [f64; 4] {
     [mass, length, time, charge].map(f64::from)
 }
 
-fn of(kind: Kind) -> [f64; 4] {
+fn exponents_of(kind: Kind) -> [f64; 4] {
     exponents(kind.dimension())
 }
 
@@ -57,10 +57,16 @@ pub(crate) fn check(
     parameters: &[Dimension],
     wanted: Dimension,
 ) -> Result<(), FormulaError> {
-    let rate = Ok(of(Kind::Velocity));
+    let rate = Ok(exponents_of(Kind::Velocity));
     let second = memory.map_or(rate, |memory| of_memory(memory, text, parameters))?;
     let all: Vec<Id> = (0..nodes.len()).collect();
-    let known = dimensions(nodes, &all, text, parameters, [of(Kind::Length), second])?;
+    let known = dimensions(
+        nodes,
+        &all,
+        text,
+        parameters,
+        [exponents_of(Kind::Length), second],
+    )?;
     let wanted = exponents(wanted);
     match known[root] {
         Some(found) if !same(found, wanted) => Err(FormulaError::new(
@@ -78,7 +84,10 @@ pub(crate) fn is_length(
     text: &str,
     parameters: &[Dimension],
 ) -> Result<bool, FormulaError> {
-    Ok(same(of_memory(memory, text, parameters)?, of(Kind::Length)))
+    Ok(same(
+        of_memory(memory, text, parameters)?,
+        exponents_of(Kind::Length),
+    ))
 }
 
 /// The dimension of a memory `s' = gain F − decay s`.
@@ -88,7 +97,7 @@ fn of_memory(
     parameters: &[Dimension],
 ) -> Result<[f64; 4], FormulaError> {
     let nodes = &memory.nodes;
-    let [force, frequency] = [Kind::Force, Kind::Frequency].map(of);
+    let [force, frequency] = [Kind::Force, Kind::Frequency].map(exponents_of);
     // Gain and decay are of parameters alone.
     let known = |id: Id| {
         let all = dimensions(nodes, &needed(nodes, id), text, parameters, [force; 2])?;

@@ -157,7 +157,7 @@ pub struct Pieces {
 
 /// What a test says without a look at the rate.
 #[derive(Clone, Copy)]
-enum Known {
+enum TestOutcome {
     Always(bool),
     /// Positive above the level of this number, or below it.
     Level {
@@ -175,7 +175,7 @@ struct Undecided {
 /// An expression on its way to one without choices.
 struct Choosing<'a> {
     nodes: &'a mut Nodes,
-    known: &'a HashMap<Id, Known>,
+    known: &'a HashMap<Id, TestOutcome>,
     aliases: &'a HashMap<Id, (Id, bool)>,
     interval: usize,
     turned: bool,
@@ -218,8 +218,10 @@ impl Choosing<'_> {
             return Ok(self.truth(other)? == same);
         }
         match self.known.get(&test) {
-            Some(Known::Always(truth)) => return Ok(*truth),
-            Some(Known::Level { number, above }) => return Ok((self.interval > *number) == *above),
+            Some(TestOutcome::Always(truth)) => return Ok(*truth),
+            Some(TestOutcome::Level { number, above }) => {
+                return Ok((self.interval > *number) == *above);
+            }
             None => {}
         }
         if let Some((.., truth)) = self.decided.iter().find(|(other, ..)| *other == test) {
@@ -259,7 +261,7 @@ impl Pieces {
             outside
         });
         let mut of_test: HashMap<Id, (f64, f64)> = HashMap::new();
-        let mut known: HashMap<Id, Known> = HashMap::new();
+        let mut known: HashMap<Id, TestOutcome> = HashMap::new();
         for id in 0..nodes.len() {
             let Node::Choice {
                 test: Test::Positive(test),
@@ -287,7 +289,7 @@ impl Pieces {
             let [slope_value, constant_value] =
                 [slope, constant].map(|id| fixed_value(&nodes, id, values));
             if slope_value == 0.0 {
-                known.insert(test, Known::Always(constant_value > 0.0));
+                known.insert(test, TestOutcome::Always(constant_value > 0.0));
                 continue;
             }
             let quotient = nodes.two(Operator::Over, constant, slope);
@@ -318,7 +320,7 @@ impl Pieces {
         };
         for (test, (gap, slope)) in of_test {
             let (number, above) = (number(gap), slope > 0.0);
-            known.insert(test, Known::Level { number, above });
+            known.insert(test, TestOutcome::Level { number, above });
         }
         let contact = outside.is_none().then(|| number(contact));
         let remembers = nodes.depends(root).turned;

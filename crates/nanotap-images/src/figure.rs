@@ -8,6 +8,7 @@ use nanotap_figures::{
 use crate::image_states::ImageStatesReport;
 use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
+use nanotap_motions::figure::panels::{largest_of, si_axis};
 
 /// Height, state and corrected height: of an image as maps, of one line as curves with the phase.
 /// Without a height, phase and state. The caption is the verdict.
@@ -41,16 +42,27 @@ fn named(name: &str, pixels: usize, report: &ImageStatesReport) -> String {
     }
 }
 
-/// Sides of the image with their factor from m, and the labels of the axes; without a size in pixels.
-fn sides(report: &ImageStatesReport) -> ([f64; 2], [String; 2]) {
-    let label = |unit: &str| ["x", "y"].map(|side| format!("position ${side}$ ({unit})"));
+/// Sides of the image with the axes along them; without a size in pixels.
+fn sides(report: &ImageStatesReport) -> ([f64; 2], [Axis; 2]) {
+    let labels = ["x", "y"].map(|side| format!("position ${side}$"));
     match report.size {
         Some(size) => {
-            let (factor, unit) = prefixed(Kind::Length, 1.0, size[0].max(size[1]));
-            (size.map(|side| factor * side), label(&unit))
+            let largest = largest_of(size);
+            let axes = labels.map(|label| si_axis(label, Kind::Length, largest));
+            (
+                size.map(|side| axes[0].1 * side),
+                axes.map(|(axis, _)| axis),
+            )
         }
-        None => (report.shape.map(|count| count as f64), label("pixels")),
+        None => (
+            report.shape.map(|count| count as f64),
+            labels.map(|label| Axis::linear(label).unit("pixels")),
+        ),
     }
+}
+
+fn phase_axis() -> Axis {
+    Axis::linear("phase").unit("°")
 }
 
 /// Factor and unit of the heights, and the least of them, in m, above which they are drawn.
@@ -68,10 +80,10 @@ fn heights(report: &ImageStatesReport) -> (f64, String, f64) {
 }
 
 fn map_figure(report: &ImageStatesReport) -> Figure {
-    let (size, labels) = sides(report);
+    let (size, axes) = sides(report);
     let [columns, lines] = report.shape;
-    let axes = || labels.clone().map(|label| Axis::linear(label).tight());
-    let map = |image: &[Vec<f64>], scale: &dyn Fn(f64) -> f64, label: String| {
+    let axes = || axes.clone().map(Axis::tight);
+    let map = |image: &[Vec<f64>], scale: &dyn Fn(f64) -> f64, colours: Axis| {
         let [x, y] = axes();
         // The line of the smallest y comes first.
         let values = image.iter().rev().flatten().map(|value| scale(*value));
@@ -81,7 +93,7 @@ fn map_figure(report: &ImageStatesReport) -> Figure {
             values,
             (0.0, size[0]),
             (0.0, size[1]),
-            Axis::linear(label),
+            colours,
         ))
     };
     let present: Vec<usize> = (0..report.states.len())
@@ -105,12 +117,12 @@ fn map_figure(report: &ImageStatesReport) -> Figure {
     let level = |height: f64| factor * (height - low);
     let of_height = |image: &Option<Vec<Vec<f64>>>, label: &str| {
         let image = image.as_ref();
-        image.map(|image| map(image, &level, format!("{label} ({unit})")))
+        image.map(|image| map(image, &level, Axis::linear(label).unit(&unit)))
     };
     let images = &report.images;
     let measured = of_height(&images.height, "height $z$").or_else(|| {
         let phase = images.phase.as_ref();
-        phase.map(|phase| map(phase, &|value| value, "phase (°)".to_owned()))
+        phase.map(|phase| map(phase, &|value| value, phase_axis()))
     });
     let corrected = of_height(&images.corrected, "corrected height");
     let panels: Vec<Panel> = measured
@@ -125,7 +137,7 @@ fn map_figure(report: &ImageStatesReport) -> Figure {
 }
 
 fn line_figure(report: &ImageStatesReport) -> Figure {
-    let (size, [label, _]) = sides(report);
+    let (size, [along, _]) = sides(report);
     let step = size[0] / report.shape[0].max(1) as f64;
     let points = |values: &[f64], scale: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
         let numbered = values.iter().enumerate();
@@ -133,14 +145,14 @@ fn line_figure(report: &ImageStatesReport) -> Figure {
             .map(|(k, value)| ((k as f64 + 0.5) * step, scale(*value)))
             .collect()
     };
-    let axis = || Axis::linear(label.clone()).range(0.0, size[0]);
+    let axis = || along.clone().range(0.0, size[0]);
     let images = &report.images;
     let mut panels = Vec::new();
     let (factor, unit, low) = heights(report);
     let level = |height: f64| factor * (height - low);
     let states = images.state.first().map_or(&[][..], Vec::as_slice);
     if let (Some(height), Some(corrected)) = (&images.height, &images.corrected) {
-        let mut panel = Panel::new(axis(), Axis::linear(format!("height $z$ ({unit})")));
+        let mut panel = Panel::new(axis(), Axis::linear("height $z$").unit(unit));
         for (k, state) in report.states.iter().enumerate() {
             let bands = bands(states, Some(k), step);
             if !bands.is_empty() && report.reference.as_ref() != Some(&state.name) {
@@ -160,7 +172,7 @@ fn line_figure(report: &ImageStatesReport) -> Figure {
         panels.push(panel.legend(Legend::Above));
     }
     if let Some(phase) = &images.phase {
-        let mut panel = Panel::new(axis(), Axis::linear("phase (°)"));
+        let mut panel = Panel::new(axis(), phase_axis());
         for state in &report.states {
             if let Some(level) = state.measured_phase {
                 panel = panel.with(Rule::horizontal(level));

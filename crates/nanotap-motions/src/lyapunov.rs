@@ -15,7 +15,7 @@ use crate::attractors::orbit_exponents;
 use crate::figure::attractors::section_figure;
 use crate::initial_state::initial_state_note;
 use crate::orbit::log_determinant_by_trace;
-use crate::simulate::{Classification, Named, check_periods, check_states, starting_state};
+use crate::simulate::{Classification, NamedMotion, check_periods, check_states, starting_state};
 use nanotap_case::Case;
 use nanotap_case::state::WrittenState;
 use nanotap_case::units::Units;
@@ -227,7 +227,7 @@ pub fn lyapunov(
     map.advance_by(&mut state, options.transient - alignment)?;
     let mut start = state.clone();
     map.advance_by(&mut start, alignment)?;
-    let named = Named::of(&classify(&mut map, &start, &ClassifyOptions::default()).kind);
+    let named = NamedMotion::of(&classify(&mut map, &start, &ClassifyOptions::default()).kind);
     if control.is_cancelled() {
         return Err(Error::stopped());
     }

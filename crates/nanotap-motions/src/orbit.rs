@@ -18,7 +18,7 @@ use crate::approach::SETPOINT_PERIODS;
 use crate::figure::motion::orbit_figure;
 use crate::initial_state::initial_state_note;
 use crate::proof::{ProofReport, Prover};
-use crate::simulate::{Named, starting_state};
+use crate::simulate::{NamedMotion, starting_state};
 use crate::upset::{Knocks, upset};
 use nanotap_case::Case;
 use nanotap_case::state::WrittenState;
@@ -261,7 +261,7 @@ fn settled(
     match period {
         None => Err(Error::numerics(format!(
             "the run from this start is not periodic ({})",
-            Named::of(&end.kind).evidence
+            NamedMotion::of(&end.kind).evidence
         ))
         .remedy("give the {period} of an orbit to look for")),
         Some(period) => near_recurrence(map, &end.state, period)

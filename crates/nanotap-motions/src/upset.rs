@@ -20,7 +20,7 @@ use nanotap_dynamics::{
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::simulate::{Classification, Named};
+use crate::simulate::{Classification, NamedMotion};
 use nanotap_case::Case;
 use nanotap_case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use nanotap_error::Error;
@@ -477,13 +477,13 @@ impl Knocked<'_> {
 
     /// The motion after a knock by the exact flow, and its state at drive phase 0; `None` if the
     /// lever returns to its orbit or stays undecided.
-    fn destination(&mut self, knock: Knock) -> Result<Option<(Named, Vec<f64>)>, Error> {
+    fn destination(&mut self, knock: Knock) -> Result<Option<(NamedMotion, Vec<f64>)>, Error> {
         let state = self.after(knock)?;
         let end = classify_exactly(&mut self.map, &state, &ClassifyOptions::default());
         if self.model.system.cancel().is_cancelled() {
             return Err(Error::stopped());
         }
-        let named = Named::of(&end.kind);
+        let named = NamedMotion::of(&end.kind);
         let own = |orbit: &PeriodicOrbit| SameMotion::orbits(orbit, &self.orbit);
         let stays = named.orbit.as_ref().is_some_and(own);
         let undecided = matches!(end.kind, MotionKind::Undecided { .. });

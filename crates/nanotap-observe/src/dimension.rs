@@ -42,7 +42,7 @@ pub enum Dimension {
 
 impl Dimension {
     /// The entry in the table of kinds.
-    const fn entry(self) -> Kind {
+    pub const fn entry(self) -> Kind {
         match self {
             Self::Length => Kind::Length,
             Self::Time => Kind::Time,

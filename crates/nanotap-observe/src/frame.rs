@@ -319,7 +319,7 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// The heads, each with its meaning and the alignment below it, and the cells of these rows, as
     /// readers are shown them.
-    pub fn shown(&self, rows: impl IntoIterator<Item = usize>) -> Shown {
+    pub fn shown(&self, rows: impl IntoIterator<Item = usize>) -> TableText {
         let rows: Vec<usize> = rows.into_iter().collect();
         let columns = self.shown_columns();
         let texts = |c: &Column<'_>| rows.iter().map(|row| self.text(c, *row)).collect();
@@ -331,14 +331,14 @@ impl<'a> Frame<'a> {
                     let cells: Vec<String> = texts(c);
                     std::iter::once(self.head(c)).chain(cells).collect()
                 };
-                Shown {
+                TableText {
                     heads: heads
                         .map(|head| (head, String::new(), Align::Left))
                         .collect(),
                     rows: values.iter().map(line).collect(),
                 }
             }
-            _ => Shown {
+            _ => TableText {
                 heads: (columns.iter())
                     .map(|c| (self.head(c), c.label.to_string(), self.align(c)))
                     .collect(),
@@ -469,7 +469,7 @@ impl<'a> Frame<'a> {
 
 /// A frame as readers are shown it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shown {
+pub struct TableText {
     /// Heads, with their meanings and the alignment below them.
     pub heads: Vec<(String, String, Align)>,
     /// The cells of each line.

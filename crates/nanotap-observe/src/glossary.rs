@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{Dimension, OBSERVABLES};
+use crate::time_series::COLUMNS;
 
 /// Description and unit of an entry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -44,24 +45,6 @@ const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
         "rate of the gap just before",
         Dimension::Velocity.model_unit(),
     ),
-    ("tau", "time", Dimension::Time.model_unit()),
-    ("tip", "tip deflection W", Dimension::Length.model_unit()),
-    (
-        "tip_rate",
-        "rate of the tip deflection",
-        Dimension::Velocity.model_unit(),
-    ),
-    (
-        "gap",
-        "gap between tip and sample",
-        Dimension::Length.model_unit(),
-    ),
-    (
-        "force",
-        "force of the sample on the tip",
-        Dimension::Force.model_unit(),
-    ),
-    ("contact", "1 in contact, else 0", "1"),
     ("classification", "what the motion is", "1"),
     ("period", "minimal period", PERIODS),
     ("periods", "periods recorded", PERIODS),
@@ -165,9 +148,9 @@ const PERIODS: &str = Dimension::Periods.model_unit();
 
 /// Creates the glossary of all entries of results.
 pub fn glossary() -> Glossary {
-    let others = OTHER_ENTRIES
-        .iter()
-        .map(|&(name, words, unit)| (name.to_owned(), Entry { words, unit }));
+    let series = COLUMNS.map(|c| (c.name, c.words, c.dimension.model_unit()));
+    let others = OTHER_ENTRIES.iter().copied().chain(series);
+    let others = others.map(|(name, words, unit)| (name.to_owned(), Entry { words, unit }));
     let model = OBSERVABLES.iter().map(|o| {
         let entry = Entry {
             words: o.words,

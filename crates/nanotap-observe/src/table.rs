@@ -63,7 +63,7 @@ impl Observable {
         OBSERVABLES.iter().find(|o| o.name == name)
     }
 
-    /// Label of an axis, for a cantilever or an oscillator.
+    /// Label of an axis, without the unit, for a cantilever or an oscillator.
     pub fn axis_label(&self, beam: bool) -> String {
         if beam {
             return self.label.to_owned();
@@ -256,7 +256,7 @@ observables! {
         "amplitude of the tip deflection at the drive frequency: what a lock-in amplifier reads",
         |m| m.component(Tip, Tone::First).norm();
     phase: f64, Angle, common,
-        "phase lag (°)",
+        "phase lag",
         "phase lag of the tip deflection behind the drive, at the drive frequency",
         |m| m.component(Tip, Tone::First).lag();
     indentation: f64, Length, common,
@@ -291,7 +291,7 @@ observables! {
         "amplitude of the tip deflection at the frequency of the second tone",
         |m| m.further_tone(0).map(Phasor::norm);
     tone2_lag: Option<f64>, Angle, rare,
-        "phase lag at the second tone (°)",
+        "phase lag at the second tone",
         "phase lag of the tip deflection behind the second tone",
         |m| m.further_tone(0).map(Phasor::lag);
     tone3_response: Option<f64>, Length, rare,
@@ -299,7 +299,7 @@ observables! {
         "amplitude of the tip deflection at the frequency of the third tone",
         |m| m.further_tone(1).map(Phasor::norm);
     tone3_lag: Option<f64>, Angle, rare,
-        "phase lag at the third tone (°)",
+        "phase lag at the third tone",
         "phase lag of the tip deflection behind the third tone",
         |m| m.further_tone(1).map(Phasor::lag);
     first_sideband: Option<f64>, Length, rare,
@@ -307,7 +307,7 @@ observables! {
         "amplitude of the tip deflection at twice the first tone's frequency less the second's",
         |m| m.first_sideband().map(Phasor::norm);
     first_sideband_phase: Option<f64>, Angle, rare,
-        "phase lag at $2f_1 - f_2$ (°)",
+        "phase lag at $2f_1 - f_2$",
         "phase lag of the tip deflection there behind the product of the tones",
         |m| m.first_sideband().map(Phasor::lag);
     second_sideband: Option<f64>, Length, rare,
@@ -315,7 +315,7 @@ observables! {
         "amplitude of the tip deflection at twice the second tone's frequency less the first's",
         |m| m.second_sideband().map(Phasor::norm);
     second_sideband_phase: Option<f64>, Angle, rare,
-        "phase lag at $2f_2 - f_1$ (°)",
+        "phase lag at $2f_2 - f_1$",
         "phase lag of the tip deflection there behind the product of the tones",
         |m| m.second_sideband().map(Phasor::lag);
     second_harmonic: f64, Length, rare,
@@ -323,7 +323,7 @@ observables! {
         "amplitude of the tip deflection at twice the drive frequency",
         |m| m.component(Tip, Tone::Harmonic(2)).norm();
     second_harmonic_phase: f64, Angle, rare,
-        "phase of the second harmonic (°)",
+        "phase of the second harmonic",
         "lag of the tip deflection at twice the drive frequency behind sin 2Ωτ",
         |m| m.component(Tip, Tone::Harmonic(2)).lag();
     third_harmonic: f64, Length, rare,
@@ -331,7 +331,7 @@ observables! {
         "amplitude of the tip deflection at three times the drive frequency",
         |m| m.component(Tip, Tone::Harmonic(3)).norm();
     third_harmonic_phase: f64, Angle, rare,
-        "phase of the third harmonic (°)",
+        "phase of the third harmonic",
         "lag of the tip deflection at three times the drive frequency behind sin 3Ωτ",
         |m| m.component(Tip, Tone::Harmonic(3)).lag();
     fourth_harmonic: f64, Length, rare,
@@ -339,7 +339,7 @@ observables! {
         "amplitude of the tip deflection at four times the drive frequency",
         |m| m.component(Tip, Tone::Harmonic(4)).norm();
     fourth_harmonic_phase: f64, Angle, rare,
-        "phase of the fourth harmonic (°)",
+        "phase of the fourth harmonic",
         "lag of the tip deflection at four times the drive frequency behind sin 4Ωτ",
         |m| m.component(Tip, Tone::Harmonic(4)).lag();
     fifth_harmonic: f64, Length, rare,
@@ -347,7 +347,7 @@ observables! {
         "amplitude of the tip deflection at five times the drive frequency",
         |m| m.component(Tip, Tone::Harmonic(5)).norm();
     fifth_harmonic_phase: f64, Angle, rare,
-        "phase of the fifth harmonic (°)",
+        "phase of the fifth harmonic",
         "lag of the tip deflection at five times the drive frequency behind sin 5Ωτ",
         |m| m.component(Tip, Tone::Harmonic(5)).lag();
     sixth_harmonic: f64, Length, rare,
@@ -355,7 +355,7 @@ observables! {
         "amplitude of the tip deflection at six times the drive frequency",
         |m| m.component(Tip, Tone::Harmonic(6)).norm();
     sixth_harmonic_phase: f64, Angle, rare,
-        "phase of the sixth harmonic (°)",
+        "phase of the sixth harmonic",
         "lag of the tip deflection at six times the drive frequency behind sin 6Ωτ",
         |m| m.component(Tip, Tone::Harmonic(6)).lag();
     rms_deflection: f64, Length, rare,
@@ -388,7 +388,7 @@ observables! {
         "amplitude that an optical lever, calibrated by a static force, reads at the drive frequency",
         |m| m.optical_lever().map(Phasor::norm);
     optical_phase: Option<f64>, Angle, rare,
-        "phase read by an optical lever (°)", "lag that an optical lever reads behind the drive",
+        "phase read by an optical lever", "lag that an optical lever reads behind the drive",
         |m| m.optical_lever().map(Phasor::lag);
     tip_motion: Option<f64>, Length, rare,
         "amplitude of the tip's own motion",
@@ -396,7 +396,7 @@ observables! {
          deflection and motion of the base together",
         |m| m.tip_motion().map(Phasor::norm);
     tip_motion_phase: Option<f64>, Angle, rare,
-        "phase of the tip's own motion (°)", "lag of the tip's height behind the base that moves it",
+        "phase of the tip's own motion", "lag of the tip's height behind the base that moves it",
         |m| m.tip_motion().map(Phasor::lag);
     energy_balance: EnergyBalance, Energy, rare,
         "energy", "energies over the recording; the residual relative to the energy exchanged",

@@ -1,7 +1,11 @@
 //! A motion as a table with one row per instant, for files and for Python.
 
+use std::rc::Rc;
+
 use nanotap_flow::Output;
 
+use crate::dimension::Dimension;
+use crate::frame::{Form, Frame, Rows};
 use nanotap_case::Case;
 use nanotap_case::quantity::Kind;
 use nanotap_case::units::Units;
@@ -11,43 +15,108 @@ use nanotap_model::{Model, MotionError};
 /// Largest number of rows of a time series: they take some gigabytes.
 pub const MAX_ROWS: usize = 10_000_000;
 
+/// A column of a time series.
+pub(crate) struct SeriesColumn {
+    pub(crate) name: &'static str,
+    /// Name in SI.
+    si_name: &'static str,
+    pub(crate) words: &'static str,
+    pub(crate) dimension: Dimension,
+}
+
+const fn column(
+    [name, si_name]: [&'static str; 2],
+    words: &'static str,
+    dimension: Dimension,
+) -> SeriesColumn {
+    SeriesColumn {
+        name,
+        si_name,
+        words,
+        dimension,
+    }
+}
+
 /// The columns before the state.
-const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];
+pub(crate) const COLUMNS: [SeriesColumn; 6] = [
+    column(["tau", "time"], "time", Dimension::Time),
+    column(["tip"; 2], "tip deflection W", Dimension::Length),
+    column(
+        ["tip_rate"; 2],
+        "rate of the tip deflection",
+        Dimension::Velocity,
+    ),
+    column(["gap"; 2], "gap between tip and sample", Dimension::Length),
+    column(
+        ["force"; 2],
+        "force of the sample on the tip",
+        Dimension::Force,
+    ),
+    column(["contact"; 2], "1 in contact, else 0", Dimension::Number),
+];
 
 /// The columns of [`sample`], in order: `tau`, `tip` (W or x), `tip_rate`, `gap`, `force`,
 /// `contact` (1 in contact, otherwise 0), then the state (`a1 … aN, v1 … vN` and `s1` for a sample
 /// with memory, or `x, v`).
 pub fn columns(model: &Model) -> Vec<String> {
-    let mut names: Vec<String> = COLUMNS.map(str::to_owned).to_vec();
-    names.extend(state_names(model));
-    names
+    let names = motion_columns().into_iter();
+    names.chain(state_names(model)).collect()
 }
 
-/// Columns of a physical case in SI: their heads without the unit, by index.
-const IN_SI: [(&str, Kind); 5] = [
-    ("time", Kind::Time),
-    ("tip", Kind::Length),
-    ("tip_rate", Kind::Velocity),
-    ("gap", Kind::Length),
-    ("force", Kind::Force),
-];
+/// The columns before the state.
+pub fn motion_columns() -> [String; COLUMNS.len()] {
+    COLUMNS.map(|column| column.name.to_owned())
+}
 
 /// The heads of the columns in these units. States stay in the model's units.
 pub fn heads(model: &Model, units: &Units) -> Vec<String> {
-    let names = columns(model).into_iter().enumerate();
-    let head = |(k, name): (usize, String)| match (units, IN_SI.get(k)) {
-        (Units::Si(_), Some((name, kind))) => units.column(name, *kind),
-        _ => units.state_column(&name),
-    };
-    names.map(head).collect()
+    let of_motion = COLUMNS.map(|column| match (units, column.dimension.kind()) {
+        (Units::Si(_), Some(kind)) => units.column(column.si_name, kind),
+        _ => column.name.to_owned(),
+    });
+    let states = state_names(model).into_iter();
+    let states = states.map(|name| units.state_column(&name));
+    of_motion.into_iter().chain(states).collect()
 }
 
 /// A row in the units of its [`heads`].
 pub fn scaled<'a>(row: &'a [f64], units: &'a Units) -> impl Iterator<Item = f64> + 'a {
-    row.iter().enumerate().map(|(k, value)| match IN_SI.get(k) {
-        Some((_, kind)) => units.scaled(*kind, *value),
-        None => *value,
+    row.iter().enumerate().map(|(k, value)| {
+        let kind = COLUMNS.get(k).and_then(|column| column.dimension.kind());
+        kind.map_or(*value, |kind| units.scaled(kind, *value))
     })
+}
+
+/// The rows of [`sample`], or their first columns, as a table in `units`; `states` are the names of the
+/// entries of a state.
+pub fn table(states: Vec<String>, rows: Vec<Vec<f64>>, units: Units) -> Frame<'static> {
+    let width = rows.first().map_or(0, Vec::len);
+    let (count, rows) = (rows.len(), Rc::new(rows));
+    let value = |k: usize| {
+        let rows = Rc::clone(&rows);
+        move |row: usize| rows[row][k]
+    };
+    let mut table = Rows::new("series", 0..count, Some(units));
+    for (k, column) in COLUMNS.iter().enumerate().take(width) {
+        let shown = (column.dimension, Form::Digits(5));
+        table = table.column(column.name, "", shown, value(k));
+        table = table.label(column.words).si_name(column.si_name);
+    }
+    for (k, name) in states
+        .into_iter()
+        .enumerate()
+        .take(width.saturating_sub(COLUMNS.len()))
+    {
+        let dimension = match units.of_entry(&name) {
+            Some((Kind::Length, _)) => Dimension::Unit("g0"),
+            Some(_) => Dimension::Unit("g0/T"),
+            None => Dimension::Number,
+        };
+        let shown = (dimension, Form::Digits(5));
+        table = table.column(name, "", shown, value(COLUMNS.len() + k));
+        table = table.label("entry of the state");
+    }
+    table.frame()
 }
 
 /// Names of the entries of a state.

@@ -7,7 +7,7 @@ use nanotap_figures::{Figure, Panel};
 
 use super::PaperError;
 use super::check::digits;
-use super::expected::Found;
+use super::expected::Computed;
 use super::motion_view::{KEY, View, empty_portrait};
 use super::runs::{Counted, Runs, how_many, stability};
 use super::section::{Picture, Section};
@@ -134,10 +134,10 @@ impl Bare {
 
 /// The numbers of `stable` motions and of `all` motions, unstable ones included, of the better of two
 /// readings. Unstable motions count only next to a stable one.
-fn found(stable: [usize; 2], all: [usize; 2]) -> Found {
+fn found(stable: [usize; 2], all: [usize; 2]) -> Computed {
     let most = |counts: [usize; 2]| counts[0].max(counts[1]) as f64;
     let any = most(stable) >= 1.0;
-    Found::readings(most(stable), if any { most(all) } else { 0.0 })
+    Computed::readings(most(stable), if any { most(all) } else { 0.0 })
 }
 
 /// The picture of up to two orbits.

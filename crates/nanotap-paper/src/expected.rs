@@ -26,7 +26,7 @@ pub(super) enum Expected {
 
 /// What a computation gave.
 #[derive(Clone, Debug)]
-pub(super) struct Found {
+pub(super) struct Computed {
     /// The numbers of the case as printed.
     printed: Vec<f64>,
     /// The numbers of another reading of the paper, with which the statement is ambiguous; empty if
@@ -34,7 +34,7 @@ pub(super) struct Found {
     other: Vec<f64>,
 }
 
-impl Found {
+impl Computed {
     /// The number with the case as printed, and that with another reading of the paper.
     pub(super) fn readings(printed: f64, other: f64) -> Self {
         let (printed, other) = (vec![printed], vec![other]);
@@ -42,33 +42,33 @@ impl Found {
     }
 }
 
-impl From<Vec<f64>> for Found {
+impl From<Vec<f64>> for Computed {
     fn from(printed: Vec<f64>) -> Self {
         let other = Vec::new();
         Self { printed, other }
     }
 }
 
-impl From<f64> for Found {
+impl From<f64> for Computed {
     fn from(number: f64) -> Self {
         vec![number].into()
     }
 }
 
-impl From<usize> for Found {
+impl From<usize> for Computed {
     fn from(count: usize) -> Self {
         (count as f64).into()
     }
 }
 
-impl From<bool> for Found {
+impl From<bool> for Computed {
     fn from(holds: bool) -> Self {
         f64::from(u8::from(holds)).into()
     }
 }
 
 /// Of a statement that needs no number.
-impl From<()> for Found {
+impl From<()> for Computed {
     fn from((): ()) -> Self {
         Vec::new().into()
     }
@@ -76,7 +76,7 @@ impl From<()> for Found {
 
 impl Expected {
     /// The verdict on the statement.
-    pub(super) fn verdict(&self, found: &Found) -> Verdict {
+    pub(super) fn verdict(&self, found: &Computed) -> Verdict {
         if matches!(self, Self::Open) || !self.admits(&found.printed) && self.admits(&found.other) {
             Verdict::Ambiguous
         } else {
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn another_reading_that_fits_leaves_a_statement_open() {
         let verdict =
-            |printed, other| Expected::AtLeast(2).verdict(&Found::readings(printed, other));
+            |printed, other| Expected::AtLeast(2).verdict(&Computed::readings(printed, other));
         assert_eq!(verdict(2.0, 0.0), Verdict::Reproduced);
         assert_eq!(verdict(1.0, 2.0), Verdict::Ambiguous);
         assert_eq!(verdict(1.0, 1.0), Verdict::Differs);

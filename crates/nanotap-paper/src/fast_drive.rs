@@ -9,7 +9,7 @@ use nanotap_figures::{Axis, Colour, Figure, Legend, Line, Markers, Panel};
 
 use super::PaperError;
 use super::check::{digits, rounds_to};
-use super::expected::Found;
+use super::expected::Computed;
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
 use super::runs::{Counted, Runs, how_many};
@@ -204,7 +204,7 @@ pub(super) fn fig8(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         )
         .check(
             "fig8-amplitude",
-            Found::readings(look.amplitude, one_mode),
+            Computed::readings(look.amplitude, one_mode),
             format!(
                 "{} with N = 3 (half of peak to peak; W from {} to {}); {} with N = 1",
                 digits(look.amplitude, 4),

@@ -4,7 +4,7 @@ use nanotap_figures::{DOUBLE_COLUMN, Figure};
 
 use super::PaperError;
 use super::check::Check;
-use super::expected::Found;
+use super::expected::Computed;
 use super::statements::Statement;
 
 /// A part of the report.
@@ -29,7 +29,7 @@ pub struct Section {
 #[derive(Clone, Debug)]
 struct Finding {
     id: &'static str,
-    found: Found,
+    found: Computed,
     here: String,
     evidence: String,
     rerun: String,
@@ -75,7 +75,7 @@ impl Section {
     pub(super) fn check(
         mut self,
         id: &'static str,
-        found: impl Into<Found>,
+        found: impl Into<Computed>,
         here: impl Into<String>,
         evidence: impl Into<String>,
         rerun: impl Into<String>,

@@ -9,7 +9,7 @@ use nanotap_figures::{Axis, Colour, Figure, Legend, Markers, Panel, Points, Shap
 
 use super::PaperError;
 use super::check::digits;
-use super::expected::Found;
+use super::expected::Computed;
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
@@ -149,7 +149,7 @@ impl Slow {
         }
         Ok(section.check(
             id,
-            Found::readings(found as f64, found_alike as f64),
+            Computed::readings(found as f64, found_alike as f64),
             here,
             evidence + further_evidence,
             self.rerun_orbit(period),

@@ -215,19 +215,19 @@ mod tests {
 
     /// An eigenvalue and its vector, the largest entry 1, of a matrix for which they have a closed
     /// form.
-    struct Known {
+    struct ClosedForm {
         matrix: [[f64; 3]; 3],
         value: Complex<f64>,
         vector: [Complex<f64>; 3],
     }
 
-    fn known() -> Vec<Known> {
+    fn known() -> Vec<ClosedForm> {
         let real = |x: f64| Complex::new(x, 0.0);
         // Triangular: eigenvalues on the diagonal, vectors by back substitution.
         let triangular = [[2.0, 1.0, 3.0], [0.0, 5.0, -1.0], [0.0, 0.0, -4.0]];
         // The companion of (x − 3)(x² + 2x + 5): vectors (1, λ, λ²)/λ².
         let companion = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [15.0, 1.0, 1.0]];
-        let of = |matrix, value, vector| Known {
+        let of = |matrix, value, vector| ClosedForm {
             matrix,
             value,
             vector,
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn a_coarse_pair_is_enclosed_or_refused() {
         let (mut enclosed, mut refused) = (0, 0);
-        for Known {
+        for ClosedForm {
             matrix,
             value,
             vector,

@@ -9,16 +9,11 @@ use nanotap::case::physical::Kind;
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, StoreError, Values, Work, WorkError, files, table};
-use nanotap::figure as figures;
 use nanotap::number::shortest;
 use nanotap::study::DatasetStudy as _;
-use nanotap::study::basin;
 use nanotap::study::fit::{FitMap, FitOptions};
 use nanotap::study::registry;
 use nanotap::study::request::read;
-use nanotap::study::scan::ScanLines;
-use nanotap::study::setpoint_map;
-use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
 use nanotap_figures::Figure;
@@ -243,26 +238,11 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf, part: bool) -> PyResult<Option
     Ok(Some((ranges, columns)))
 }
 
-fn opened(path: &Path) -> Result<(Store, String), Failure> {
-    let store = Store::open(path)?;
-    let kind = store.schema().attributes.get("kind");
-    let kind = kind.and_then(|kind| kind.as_str()).unwrap_or_default();
-    let kind = kind.to_owned();
-    Ok((store, kind))
-}
-
 /// The summary of a finished dataset: JSON.
 #[pyfunction]
 pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
     let summary = || -> Result<String, Failure> {
-        let (store, kind) = opened(&path)?;
-        Ok(match kind.as_str() {
-            "basin" => serde_json::to_string(&basin::shares(&store)?)?,
-            "scan" => serde_json::to_string(&ScanLines::report(&store)?)?,
-            "fit" => serde_json::to_string(&FitMap::report(&store)?)?,
-            setpoint_map::KIND => serde_json::to_string(&Window::of(&store)?)?,
-            _ => serde_json::to_string(&Summary::of(&store)?)?,
-        })
+        Ok(registry::summarised(&Store::open(&path)?)?.document()?)
     };
     Ok(summary()?)
 }
@@ -271,8 +251,7 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
 #[pyfunction]
 pub(crate) fn window(path: PathBuf) -> PyResult<String> {
     let window = || -> Result<String, Failure> {
-        let (store, _) = opened(&path)?;
-        Ok(serde_json::to_string(&Window::kept(&store)?)?)
+        Ok(serde_json::to_string(&Window::kept(&Store::open(&path)?)?)?)
     };
     Ok(window()?)
 }
@@ -286,14 +265,8 @@ pub(crate) fn figure<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let format = format.to_owned();
     let done = watched(py, None, move |_| {
-        let (store, kind) = opened(&path)?;
-        let figure = match kind.as_str() {
-            "basin" => figures::basin::figure(&store)?,
-            "scan" => figures::scan::scan_figure(&ScanLines::report(&store)?),
-            "fit" => figures::fit::FitMaps::of(&store)?.figure(),
-            setpoint_map::KIND => figures::window::figure(&store)?,
-            _ => figures::sweep::figure(&store)?,
-        };
+        let summary = registry::summarised(&Store::open(&path)?)?;
+        let figure = summary.figure().unwrap_or_default();
         drawn(&figure, &format)
     })?;
     Ok(PyBytes::new(py, &done.result))
@@ -335,7 +308,7 @@ impl From<StoreError> for TableError {
 #[pyfunction]
 pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
     let write = || -> Result<(), Failure> {
-        let (store, _) = opened(&path)?;
+        let store = Store::open(&path)?;
         let refuse = |error: std::io::Error| -> Failure {
             nanotap::Error::files(format!("cannot write {}: {error}", out.display())).into()
         };

@@ -3,12 +3,11 @@
 use std::collections::HashMap;
 
 use nanotap::case::physical::Kind;
-use nanotap::case::units::prefixed;
 use nanotap::figure::approach::ApproachCurves;
 use nanotap::figure::basin::BasinTable;
 use nanotap::figure::branch::BranchCurves;
 use nanotap::figure::fit::FitMaps;
-use nanotap::figure::panels::MotionCurves;
+use nanotap::figure::panels::{MotionCurves, si_axis};
 use nanotap::figure::scan::scan_figure;
 use nanotap::figure::sweep::SweepTable;
 use nanotap::study::scan::ScanReport;
@@ -28,7 +27,9 @@ pub(crate) fn mathtext(label: &str) -> String {
 /// that fits; 1 and nothing for another unit.
 #[pyfunction]
 pub(crate) fn axis(unit: &str, size: f64) -> (f64, String) {
-    Kind::of_si_unit(unit).map_or((1.0, String::new()), |kind| prefixed(kind, 1.0, size))
+    let kind = Kind::of_si_unit(unit).unwrap_or(Kind::Number);
+    let (axis, factor) = si_axis("", kind, size);
+    (factor, axis.unit)
 }
 
 /// Colours: of lines in their order, of the periods 1 to 16, and of the other classes of motions.

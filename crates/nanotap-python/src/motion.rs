@@ -1,20 +1,17 @@
 //! Single motions: modes, runs, orbits, and observables of many cases at once.
 
 use std::collections::BTreeMap;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
-use nanotap::case::physical::Kind;
-use nanotap::case::units::Units;
 use nanotap::control::Control;
-use nanotap::frame::{Form, Frame, Rows as FrameRows};
+use nanotap::frame::Frame;
 use nanotap::map::MAX_NUMBERS;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
+use nanotap::observe::OBSERVABLES;
 use nanotap::observe::time_series::{self, state_names};
-use nanotap::observe::{Dimension, OBSERVABLES};
 use nanotap::study::in_si::InSi;
 use nanotap::study::modes::{ModesOptions, ModesStudy, shape_table};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
@@ -175,7 +172,8 @@ impl Answer for MotionAnswer {
 
     fn frames(&self) -> Vec<Frame<'_>> {
         let series = self.series().ok();
-        let series = series.map(|(model, rows)| series_table(&model, rows, self.case.units()));
+        let series = series
+            .map(|(model, rows)| time_series::table(state_names(&model), rows, self.case.units()));
         let further = match &self.report {
             MotionReport::Orbit(orbit) => OrbitStudy::frames(&self.case, orbit),
             // Its table is the curve, which is the series.
@@ -191,46 +189,6 @@ impl Answer for MotionAnswer {
             MotionReport::Orbit(orbit) => OrbitStudy::figure(&self.case, orbit),
         }
     }
-}
-
-/// A time series in the model's units as a table, shown in `units`, with the columns of
-/// [`time_series::sample`] or the first of them; states stay in the model's units.
-fn series_table(model: &Model, rows: Vec<Vec<f64>>, units: Units) -> Frame<'static> {
-    const DIMENSIONS: [Dimension; 6] = [
-        Dimension::Time,
-        Dimension::Length,
-        Dimension::Velocity,
-        Dimension::Length,
-        Dimension::Force,
-        Dimension::Number,
-    ];
-    let words = nanotap::observe::glossary::glossary().model;
-    let width = rows.first().map_or(0, Vec::len);
-    let (count, rows) = (rows.len(), Rc::new(rows));
-    let mut table = FrameRows::new("series", 0..count, Some(units));
-    for (k, name) in time_series::columns(model)
-        .into_iter()
-        .enumerate()
-        .take(width)
-    {
-        let dimension = DIMENSIONS.get(k).copied();
-        let dimension = dimension.unwrap_or_else(|| match units.of_entry(&name) {
-            Some((Kind::Length, _)) => Dimension::Unit("g0"),
-            Some(_) => Dimension::Unit("g0/T"),
-            None => Dimension::Number,
-        });
-        let label = words
-            .get(&name)
-            .map_or("entry of the state", |entry| entry.words);
-        let rows = Rc::clone(&rows);
-        let cell = move |row: usize| rows[row][k];
-        table = table.column(name, "", (dimension, Form::Digits(5)), cell);
-        table = table.label(label);
-        if k == 0 {
-            table = table.si_name("time");
-        }
-    }
-    table.frame()
 }
 
 /// A run: its document, its values as columns of one row, its report, and `series_periods` of its
@@ -250,8 +208,8 @@ pub(crate) fn simulate<'py>(
     let done = watched_alone(py, None, move |control| {
         let report = SimulateStudy::run(&case, &request, control)?;
         let (names, values) = if let SimulateReport::FixedStep(run) = &report {
-            let names = ["tau", "tip", "tip_rate"].map(str::to_owned).to_vec();
-            (names, run.curve.concat())
+            let [time, tip, rate, ..] = time_series::motion_columns();
+            (vec![time, tip, rate], run.curve.concat())
         } else {
             let case = case.cancelled_by(control);
             let model = case.model()?;

@@ -111,6 +111,8 @@ pub trait DatasetStudy {
     const ABOUT: &'static str;
     /// Noun for what the progress counts, in the plural.
     const COUNTED: &'static str;
+    /// Kind of the datasets that are this study's alone.
+    const KIND: &'static str = Self::NAME;
     /// Noun for what the progress of the plan counts, in the plural.
     const PLANNED: &'static str = "approaches to the setpoints";
     /// Options: what front ends show, check and pass on as JSON.

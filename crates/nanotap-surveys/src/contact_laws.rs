@@ -28,7 +28,7 @@ use nanotap_model::recording::Curve;
 use nanotap_model::sample_law::SampleLaw;
 use nanotap_motions::branch::{BranchOptions, BranchReport, Range, branches_through};
 use nanotap_motions::orbit::{OrbitOptions, OrbitReport, no_period, orbit, spectral_radius};
-use nanotap_motions::simulate::{Classification, Named};
+use nanotap_motions::simulate::{Classification, NamedMotion};
 use nanotap_observe::frame::{Frame, Rows, frame};
 use nanotap_observe::{Observables, PhysicalMotion};
 use nanotap_study::Study;
@@ -292,7 +292,7 @@ fn motion(
     let model = model.cancelled_by(&control.flag());
     let rest = vec![0.0; model.dimension()];
     let mut map = ModelMap::new(&model);
-    let named = Named::of(&classify(&mut map, &rest, &ClassifyOptions::default()).kind);
+    let named = NamedMotion::of(&classify(&mut map, &rest, &ClassifyOptions::default()).kind);
     let options = OrbitOptions {
         period: Some(period),
         harmonics: 0,

@@ -440,6 +440,8 @@ impl DatasetStudy for WindowStudy {
                                  one motion, and where a second state, subharmonics or chaos \
                                  threaten";
     const COUNTED: &'static str = "values";
+    // At a distance it leaves those of a sweep.
+    const KIND: &'static str = setpoint_map::KIND;
     type Options = WindowOptions;
     type Report = Window;
 

@@ -135,7 +135,7 @@ fn with_attractions(law: &Arc<dyn ForceLaw>, others: &[(&str, &[f64])]) -> Arc<d
 /// Parameters of a capillary bridge that forms at 1.2 nm and ruptures at about 4 nm.
 const CAPILLARY: [f64; 9] = [0.7, 0.5, f64::INFINITY, 0.3, 10.0, 0.2, 0.03, 0.6, 0.02];
 
-struct Found {
+struct MeasuredOrbit {
     orbit: PeriodicOrbit,
     amplitude: f64,
     /// In degrees.
@@ -152,7 +152,7 @@ struct Found {
 }
 
 /// The orbit that Newton's method reaches from rest after some periods.
-fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, guess: &[f64], periods: usize) -> Found {
+fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, guess: &[f64], periods: usize) -> MeasuredOrbit {
     let system = lever.system(law);
     let (dimension, n) = (system.dimension(), lever.modes);
     let mut map = Strobe::new(system, TAU);
@@ -181,7 +181,7 @@ fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, guess: &[f64], periods: usize) -
         tones: Vec::new(),
         force: 1.0,
     };
-    Found {
+    MeasuredOrbit {
         amplitude: c.modulus(),
         phase: (-c.im.atan2(c.re)).to_degrees() - 90.0,
         dissipated: -motion.work(),
@@ -196,7 +196,7 @@ fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, guess: &[f64], periods: usize) -
 }
 
 /// Amplitude, phase, E_dis, F_max, contact time, mean force and virial.
-fn compare(found: &Found, expected: [f64; 7], tolerance: f64) {
+fn compare(found: &MeasuredOrbit, expected: [f64; 7], tolerance: f64) {
     let values = [
         found.amplitude,
         found.phase,

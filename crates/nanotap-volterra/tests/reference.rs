@@ -51,7 +51,7 @@ fn dmt() -> Arc<dyn ForceLaw> {
     laws::build("dmt", &values).unwrap()
 }
 
-struct Found {
+struct MeasuredOrbit {
     orbit: PeriodicOrbit,
     motion: Trajectory,
     amplitude: f64,
@@ -68,7 +68,7 @@ struct Found {
 }
 
 /// The orbit near amplitude `a` and phase `phase` (degrees).
-fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, a: f64, phase: f64) -> Found {
+fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, a: f64, phase: f64) -> MeasuredOrbit {
     let mut map = Strobe::new(lever.system(law, NODES), TAU);
     let angle = phase.to_radians();
     let guess = [a * angle.cos(), a * angle.sin()];
@@ -82,7 +82,7 @@ fn orbit(lever: &Lever, law: Arc<dyn ForceLaw>, a: f64, phase: f64) -> Found {
         out[1] = s.force;
         out[2] = s.state[0];
     });
-    Found {
+    MeasuredOrbit {
         amplitude: c.modulus(),
         phase: (-c.im).atan2(c.re).to_degrees(),
         mean: means[2] / TAU,

@@ -95,43 +95,55 @@ pub(crate) fn follow_in(folder: &Folder, name: &str) -> (usize, usize) {
     let mut said = Value::Null;
     let mut last = String::new();
     let examples = crate::front_page::examples(&text);
-    for line in text.lines() {
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
         if let Some(command) = line.strip_prefix("$ nanotap ") {
             let mut arguments = words(command);
-            if !arguments.iter().any(|a| a == "--json") {
-                arguments.push("--json".into());
-            }
-            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-            said = folder.run(&arguments).json();
-            command.clone_into(&mut last);
             // After the commands before it, whose files it may read.
-            for (_, shown) in examples.iter().filter(|(of, _)| *of == command) {
+            let shown = examples.iter().filter(|(of, _)| *of == command);
+            let shown: Vec<_> = shown.map(|(_, shown)| shown).collect();
+            for shown in &shown {
                 crate::front_page::prints(folder, command, shown);
             }
+            let until_next = lines
+                .clone()
+                .take_while(|line| !line.starts_with("$ nanotap "));
+            // What it prints is all that is compared.
+            if shown.is_empty() || until_next.filter_map(compared).next().is_some() {
+                if !arguments.iter().any(|a| a == "--json") {
+                    arguments.push("--json".into());
+                }
+                let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+                said = folder.run(&arguments).json();
+            }
+            command.clone_into(&mut last);
             commands += 1;
             // Figures that the document mentions are drawn.
             if let Some(k) = arguments.iter().position(|a| *a == "--plot") {
                 assert!(folder.path().join(arguments[k + 1]).exists(), "{last}");
             }
         }
-        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
-        if cells.len() == 6
-            && let Some(pointer) = cells[2]
-                .strip_prefix("`/")
-                .and_then(|p| p.strip_suffix('`'))
-        {
-            let found = said.pointer(&format!("/{pointer}"));
-            let found = found.unwrap_or_else(|| panic!("{name}: {last}: no /{pointer}"));
+        if let Some((pointer, value, within)) = compared(line) {
+            let found = said.pointer(pointer);
+            let found = found.unwrap_or_else(|| panic!("{name}: {last}: no {pointer}"));
             assert!(
-                holds(found, cells[3], cells[4]),
-                "{name}: {last}: /{pointer} is {found}, not {} within {}",
-                cells[3],
-                cells[4]
+                holds(found, value, within),
+                "{name}: {last}: {pointer} is {found}, not {value} within {within}"
             );
             numbers += 1;
         }
     }
     (commands, numbers)
+}
+
+/// Pointer, value and tolerance of a line of a table of values.
+fn compared(line: &str) -> Option<(&str, &str, &str)> {
+    let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+    let &[_, _, pointer, value, within, _] = cells.as_slice() else {
+        return None;
+    };
+    let pointer = pointer.strip_prefix('`')?.strip_suffix('`')?;
+    pointer.starts_with('/').then_some((pointer, value, within))
 }
 
 /// Every document has a test here: a new one needs a line.
@@ -194,14 +206,20 @@ fn every_document_has_a_test() {
     );
 }
 
-/// A word of a command with at most 9 values in its range: the same figure, of fewer points.
-fn coarse(word: &str) -> String {
-    match word.rsplit_once(':') {
-        Some((ends, count)) if ends.contains(':') && count.parse().is_ok_and(|n: usize| n > 9) => {
-            format!("{ends}:9")
+/// A command with few values in its ranges and few points: the same figure, drawn in less time.
+fn coarse(words: Vec<String>) -> Vec<String> {
+    const FEW: usize = 4;
+    let is_many = |count: &str| count.parse().is_ok_and(|count: usize| count > FEW);
+    let mut after_points = false;
+    let mut coarsened = |word: String| {
+        let is_points = std::mem::replace(&mut after_points, word == "--points");
+        match word.rsplit_once(':') {
+            Some((ends, count)) if ends.contains(':') && is_many(count) => format!("{ends}:{FEW}"),
+            None if is_points && is_many(&word) => FEW.to_string(),
+            _ => word,
         }
-        _ => word.to_owned(),
-    }
+    };
+    words.into_iter().map(&mut coarsened).collect()
 }
 
 /// The gallery shows commands of other pages, which are run there, and further ones. `cargo xtask
@@ -226,7 +244,7 @@ fn the_gallery() {
         let figure = &words[words.iter().position(|w| w == "--plot").unwrap() + 1];
         assert!(gallery.contains(&format!("/{figure})")), "{figure}");
         if !others.contains(&command) {
-            let words: Vec<String> = words.iter().map(|word| coarse(word)).collect();
+            let words = coarse(words.clone());
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
             let outcome = folder.run(&words);
             assert_eq!(outcome.code, 0, "{command}: {}", outcome.stderr);

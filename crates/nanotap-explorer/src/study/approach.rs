@@ -70,7 +70,7 @@ impl Approached {
             Some(metres) => Axis {
                 key: Key::GapTip,
                 factor: factor / metres,
-                unit: unit.trim_matches([' ', '(', ')']).to_owned(),
+                unit,
             },
             None => Axis {
                 key: case.gap_key(),

@@ -67,7 +67,7 @@ fn length(value: f64) -> Value {
 }
 
 /// What both methods know of a line.
-struct Known<'a> {
+struct LineNumbers<'a> {
     size: f64,
     line_rate: f64,
     periods: usize,
@@ -80,7 +80,7 @@ struct Known<'a> {
 }
 
 fn averaged(line: &AveragedLine) -> Value {
-    numbers(&Known {
+    numbers(&LineNumbers {
         size: line.size,
         line_rate: line.line_rate,
         periods: line.periods_per_line,
@@ -94,7 +94,7 @@ fn averaged(line: &AveragedLine) -> Value {
 }
 
 fn exact(report: &ScanReport) -> Value {
-    let mut line = numbers(&Known {
+    let mut line = numbers(&LineNumbers {
         size: report.size[0],
         line_rate: report.line_rate,
         periods: report.periods_per_line,
@@ -135,7 +135,7 @@ fn exact(report: &ScanReport) -> Value {
     line
 }
 
-fn numbers(line: &Known<'_>) -> Value {
+fn numbers(line: &LineNumbers<'_>) -> Value {
     let count = line.trace.height.first().map_or(0, Vec::len);
     let step = line.size / count.max(1) as f64;
     let x: Vec<f64> = (0..count).map(|k| (k as f64 + 0.5) * step).collect();
@@ -158,7 +158,7 @@ fn numbers(line: &Known<'_>) -> Value {
 }
 
 /// The channels of a direction, in SI: the band is what the deflection fills.
-fn direction(line: &Known<'_>, of: &Channels) -> Value {
+fn direction(line: &LineNumbers<'_>, of: &Channels) -> Value {
     let amplitude: Vec<f64> = of.amplitude_error[0]
         .iter()
         .map(|error| error + line.setpoint)
@@ -182,7 +182,7 @@ fn direction(line: &Known<'_>, of: &Channels) -> Value {
 
 /// Where the amplitude is off the setpoint in a direction, and whether it stays so to the end of the
 /// line, far above the surface.
-fn lag(line: &Known<'_>, of: &LineStatistics) -> Value {
+fn lag(line: &LineNumbers<'_>, of: &LineStatistics) -> Value {
     let periods: usize = of.off_setpoint.iter().map(|off| off.periods).sum();
     let end = of.first_period + line.periods;
     let lost = of

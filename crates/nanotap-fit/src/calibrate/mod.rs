@@ -252,10 +252,10 @@ impl CalibrateReport {
 
     fn estimates(&self) -> Vec<EstimateRow> {
         let calibration = &self.calibration;
-        let stiffness: Shown = ("N/m", |value| Kind::Stiffness.format(value));
-        let frequency: Shown = ("Hz", |value| Kind::Frequency.format_digits(value, 6));
-        let sensitivity: Shown = ("m/V", |value| SENSITIVITY.format_digits(value, 4));
-        let [rms, floor]: [Shown; 2] = match calibration.unit {
+        let stiffness: UnitAndText = ("N/m", |value| Kind::Stiffness.format(value));
+        let frequency: UnitAndText = ("Hz", |value| Kind::Frequency.format_digits(value, 6));
+        let sensitivity: UnitAndText = ("m/V", |value| SENSITIVITY.format_digits(value, 4));
+        let [rms, floor]: [UnitAndText; 2] = match calibration.unit {
             Unit::Volt => [
                 ("V", |value| Kind::Voltage.format(value)),
                 ("V/sqrt(Hz)", |value| {
@@ -303,7 +303,7 @@ impl CalibrateReport {
 }
 
 /// A unit, and how a number in it is shown.
-type Shown = (&'static str, fn(f64) -> String);
+type UnitAndText = (&'static str, fn(f64) -> String);
 
 /// A row of the table of estimates.
 #[derive(Clone, Copy)]

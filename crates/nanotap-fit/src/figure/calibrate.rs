@@ -6,7 +6,7 @@ use nanotap_figures::{
 
 use crate::calibrate::CalibrateReport;
 use nanotap_case::physical::Kind;
-use nanotap_case::units::prefixed;
+use nanotap_motions::figure::panels::si_axis;
 
 /// Most points of a line; groups of more bins are averaged.
 const MAX_POINTS: usize = 1500;
@@ -16,7 +16,7 @@ pub fn calibrate_figure(report: &CalibrateReport) -> Figure {
     let [low, high] = report.calibration.range;
     let margin = 0.15 * (high - low);
     let shown = [(low - margin).max(0.0), high + margin];
-    let (factor, unit) = prefixed(Kind::Frequency, 1.0, high);
+    let (axis, factor) = si_axis("frequency", Kind::Frequency, high);
     let spectrum = &report.spectrum;
     let inside = |[low, high]: [f64; 2], value: &dyn Fn(f64, f64) -> f64| {
         let bins = spectrum.frequencies().zip(spectrum.powers());
@@ -26,18 +26,15 @@ pub fn calibrate_figure(report: &CalibrateReport) -> Figure {
             .collect();
         averaged(&points)
     };
-    let axis = || {
-        let axis = Axis::linear(format!("frequency ({unit})"));
-        axis.range(factor * shown[0], factor * shown[1])
-    };
+    let axis = || axis.clone().range(factor * shown[0], factor * shown[1]);
     let fit = (0..=1000).map(|k| {
         let f = low + (high - low) * f64::from(k) / 1000.0;
         (factor * f, report.calibration.density(f))
     });
     let symbol = report.calibration.unit.symbol();
-    let label = format!("power density ({symbol}²/Hz)");
+    let density = Axis::log("power density").unit(format!("{symbol}²/Hz"));
     let measured = Line::new(inside(shown, &|_, power| power)).colour(Colour::GREY);
-    let spectrum = Panel::new(axis(), Axis::log(label))
+    let spectrum = Panel::new(axis(), density)
         .legend(Legend::Above)
         .with(measured.width(0.6).label("measured"))
         .with(

@@ -5,7 +5,7 @@ use nanotap_figures::{Axis, Colour, Figure, Heatmap, Line, ONE_AND_A_HALF_COLUMN
 
 use crate::files::{Item, style_name};
 use nanotap_case::physical::Kind;
-use nanotap_case::units::prefixed;
+use nanotap_motions::figure::panels::{largest_of, si_axis};
 
 /// Most points of a line; of longer ones every n-th is drawn.
 const MAX_POINTS: usize = 4000;
@@ -20,26 +20,11 @@ pub fn item_figure(item: &Item) -> Figure {
     Figure::single(panel).width(ONE_AND_A_HALF_COLUMNS)
 }
 
-/// Numbers in the prefixed unit that fits, and the label of their axis.
-fn shown<'a>(
-    name: &str,
-    unit: &str,
-    values: impl Iterator<Item = &'a f64> + Clone,
-) -> (f64, String) {
-    let kind = match unit {
-        "m" => Some(Kind::Length),
-        "N" => Some(Kind::Force),
-        "V" => Some(Kind::Voltage),
-        "N/m" => Some(Kind::Stiffness),
-        "Hz" => Some(Kind::Frequency),
-        _ => None,
-    };
-    let finite = values.filter(|of| of.is_finite());
-    let size = finite.fold(0.0_f64, |size, of| size.max(of.abs()));
-    match kind.map(|kind| prefixed(kind, 1.0, size)) {
-        Some((factor, unit)) => (factor, format!("{name} ({unit})")),
-        None if unit.is_empty() => (1.0, name.to_owned()),
-        None => (1.0, format!("{name} ({unit})")),
+/// The axis of numbers in this unit, and their factor: with a prefix if it is a unit of SI.
+fn shown<'a>(name: &str, unit: &str, values: impl Iterator<Item = &'a f64>) -> (Axis, f64) {
+    match Kind::of_si_unit(unit) {
+        Some(kind) => si_axis(name, kind, largest_of(values.copied())),
+        None => (Axis::linear(name).unit(unit), 1.0),
     }
 }
 
@@ -64,8 +49,8 @@ fn curve_panel(curve: &Curve) -> Panel {
         let values = found.iter().flat_map(|of| &of.values);
         shown(name.unwrap_or(other), unit, values)
     };
-    let ((x_factor, x_label), (y_factor, y_label)) = (axis(x, "point"), axis(y, "value"));
-    let mut panel = Panel::new(Axis::linear(x_label), Axis::linear(y_label));
+    let ((along, x_factor), (up, y_factor)) = (axis(x, "point"), axis(y, "value"));
+    let mut panel = Panel::new(along, up);
     for segment in &curve.segments {
         let Some(values) = y.and_then(|of| segment.channel(of)) else {
             continue;
@@ -98,23 +83,23 @@ fn image_panel(image: &Image) -> Panel {
     let sides = image.size.unwrap_or([columns as f64, rows as f64]);
     let unit = if image.size.is_some() { "m" } else { "" };
     let axis = |name: &str| shown(name, unit, sides.iter());
-    let ((factor, x), (_, y)) = (axis("x"), axis("y"));
-    let (scale, label) = shown(&image.name, &image.unit, image.values.iter());
+    let ((x, factor), (y, _)) = (axis("x"), axis("y"));
+    let (colours, scale) = shown(&image.name, &image.unit, image.values.iter());
     // The row of the smallest y comes first.
     let from_below = image.values.chunks(columns.max(1)).rev().flatten();
-    Panel::new(Axis::linear(x).tight(), Axis::linear(y).tight()).with(Heatmap::new(
+    Panel::new(x.tight(), y.tight()).with(Heatmap::new(
         columns,
         rows,
         from_below.map(|of| scale * of),
         (0.0, factor * sides[0]),
         (0.0, factor * sides[1]),
-        Axis::linear(label),
+        colours,
     ))
 }
 
 fn spectrum_panel(spectrum: &Spectrum) -> Panel {
-    let (factor, x) = shown("frequency", "Hz", spectrum.frequency.iter());
-    let y = format!("{} ({})", spectrum.name, spectrum.unit);
+    let (x, factor) = shown("frequency", "Hz", spectrum.frequency.iter());
+    let y = Axis::log(&spectrum.name).unit(&spectrum.unit);
     // A logarithm needs values above zero.
     let drawn = spectrum.frequency.iter().zip(&spectrum.values);
     let drawn: Vec<(f64, f64)> = drawn
@@ -123,5 +108,5 @@ fn spectrum_panel(spectrum: &Spectrum) -> Panel {
         .collect();
     let step = drawn.len().div_ceil(MAX_POINTS).max(1);
     let points: Vec<(f64, f64)> = drawn.into_iter().step_by(step).collect();
-    Panel::new(Axis::linear(x), Axis::log(y)).with(Line::new(points).colour(Colour::BLUE))
+    Panel::new(x, y).with(Line::new(points).colour(Colour::BLUE))
 }

@@ -8,10 +8,10 @@ use serde::Deserialize;
 use crate::fit::{FitReport, FittedColumn, FittedRow, OF_FORCES, Reading};
 use nanotap_case::Key;
 use nanotap_case::physical::Kind;
-use nanotap_case::units::prefixed;
 use nanotap_dataset::schema::Attributes;
 use nanotap_dataset::{Store, StoreError};
 use nanotap_motions::approach::Way;
+use nanotap_motions::figure::panels::{largest_of, si_axis};
 use nanotap_motions::figure::plotted_quantity::PlottedQuantity;
 use nanotap_motions::frequency_modulation::Modulated;
 use nanotap_observe::frame::Row as _;
@@ -38,26 +38,18 @@ impl MappedColumn {
 
     /// The values as they are drawn, and their axis.
     fn drawn(&self) -> (Vec<f64>, Axis) {
-        let (factor, title) = self.shown();
+        let (axis, factor) = self.axis();
         let values = self.numbers().map(|value| factor * value).collect();
-        (values, Axis::linear(title))
+        (values, axis)
     }
 
-    /// What multiplies the values where they are drawn, and the title with the unit.
-    fn shown(&self) -> (f64, String) {
-        let finite = self.numbers().filter(|value| value.is_finite());
-        let size = finite.fold(0.0, |m: f64, v| m.max(v.abs()));
+    /// The axis, and what multiplies the values where they are drawn.
+    fn axis(&self) -> (Axis, f64) {
         let kind = Key::find(&self.name).map(Key::kind);
-        let kind = kind.or_else(|| Kind::of_si_unit(&self.units));
-        let (factor, unit) = match kind {
-            Some(kind) if kind != Kind::Number => prefixed(kind, 1.0, size),
-            _ => (1.0, self.units.clone()),
-        };
-        let title = match unit.as_str() {
-            "1" | "" => self.name.clone(),
-            unit => format!("{} ({unit})", self.name),
-        };
-        (factor, title)
+        match kind.or_else(|| Kind::of_si_unit(&self.units)) {
+            Some(kind) => si_axis(&self.name, kind, largest_of(self.numbers())),
+            None => (Axis::linear(&self.name).unit(&self.units), 1.0),
+        }
     }
 }
 
@@ -186,13 +178,8 @@ fn swept(report: &FitReport) -> (Axis, f64) {
     let key = Key::all().find(|key| key.path() == report.swept);
     let size = report.rows.iter().map(|r| r.at.abs()).fold(0.0, f64::max);
     let symbol = key.map_or_else(|| report.swept.clone(), Key::label);
-    match key.filter(|key| key.is_physical()).map(Key::kind) {
-        Some(kind) if kind != Kind::Number => {
-            let (factor, unit) = prefixed(kind, 1.0, size);
-            (Axis::linear(format!("{symbol} ({unit})")), factor)
-        }
-        _ => (Axis::linear(symbol), 1.0),
-    }
+    let kind = key.filter(|key| key.is_physical()).map(Key::kind);
+    si_axis(symbol, kind.unwrap_or(Kind::Number), size)
 }
 
 /// Rows in one colour: name, colour and indices.
@@ -240,13 +227,10 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
         .find(|c| c.name == column.observable);
     let name = modulated.map_or(column.name.as_str(), |c| c.label);
     let kind = modulated.map_or_else(|| Kind::of_si_unit(&column.unit), |c| c.dimension.kind());
-    let (label, factor) = match (shown, kind) {
+    let (axis, factor) = match (shown, kind) {
         (Some(shown), _) => shown.axis(true, si, size),
-        (None, Some(kind)) if column.unit != "1" => {
-            let (factor, unit) = prefixed(kind, 1.0, size);
-            (format!("{name} ({unit})"), factor)
-        }
-        (None, _) => (name.to_owned(), 1.0),
+        (None, Some(kind)) if column.unit != "1" => si_axis(name, kind, size),
+        (None, _) => (Axis::linear(name), 1.0),
     };
     let y = |value: f64| factor * if phase { shown_phase(value) } else { value };
     let points = |rows: &[&FittedRow], of: fn(&Reading) -> Option<f64>| -> Vec<(f64, f64)> {
@@ -256,7 +240,7 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
         };
         rows.iter().filter_map(point).collect()
     };
-    let mut panel = Panel::new(x, Axis::linear(label));
+    let mut panel = Panel::new(x, axis);
     for (index, jump) in report.jumps.iter().enumerate() {
         let fold = Rule::vertical(along * jump.fold);
         // One entry of the legend for all.

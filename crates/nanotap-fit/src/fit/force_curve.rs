@@ -8,7 +8,7 @@ use super::parameters::{Parameter, Target};
 use super::problem::Problem;
 use super::quantity::{Quantity, RestQuantity};
 use super::report::{Estimate, FitReport, FittedForceCurve};
-use super::search::{Found, Search};
+use super::search::{Search, SearchedFit};
 use super::selection::{self, Contact};
 use super::solve::{LeastSquares as _, Solution};
 use nanotap_case::physical::Kind;
@@ -231,7 +231,7 @@ fn best_by_force(search: &Search<'_>, x: &[f64]) -> Option<Vec<f64>> {
 
 impl Search<'_> {
     /// The fit at these values.
-    fn at(&self, x: &[f64]) -> Option<Found> {
+    fn at(&self, x: &[f64]) -> Option<SearchedFit> {
         let (mut point, candidates) = self.problem.discover(x, None);
         let rows = self.problem.data.rows().count();
         let residuals = self.problem.residuals(x, &point);
@@ -245,7 +245,7 @@ impl Search<'_> {
         };
         let residuals = problem.residuals(x, &point);
         let jacobian = problem.jacobian(x, &mut point)?;
-        Some(Found {
+        Some(SearchedFit {
             solution: Solution {
                 x: x.to_vec(),
                 point,

@@ -18,7 +18,7 @@ use super::report::{
     CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, Likelihood,
     OtherOrbit, Reading, RowLikelihood, Undetermined,
 };
-use super::search::{Found, MIN_PROBABILITY, Search, branches_of};
+use super::search::{MIN_PROBABILITY, Search, SearchedFit, branches_of};
 use super::solve::LeastSquares as _;
 use super::statistics::{self, Information, Sequences, information, student};
 
@@ -50,7 +50,7 @@ const MAX_ENDED: usize = 2;
 
 impl Search<'_> {
     /// The problem with the standard errors and the jumps of a result.
-    pub(super) fn problem_of(&self, found: &Found) -> Problem<'_> {
+    pub(super) fn problem_of(&self, found: &SearchedFit) -> Problem<'_> {
         let mut problem = self.weighted(found.noise.clone(), None);
         problem.jumps.clone_from(&found.jumps);
         problem
@@ -58,7 +58,7 @@ impl Search<'_> {
 
     /// The likelihood of every row: −2 ln L of its values, without the places of jumps, because
     /// another law may have no fold.
-    pub(super) fn likelihood(&self, found: &Found) -> Likelihood {
+    pub(super) fn likelihood(&self, found: &SearchedFit) -> Likelihood {
         let data = self.problem.data;
         let x = &found.solution.x;
         let rows = self
@@ -99,18 +99,23 @@ impl Search<'_> {
     }
 
     /// Sum of the squared residuals of the priors.
-    fn squared_priors(&self, found: &Found) -> f64 {
+    fn squared_priors(&self, found: &SearchedFit) -> f64 {
         let all = self.problem.prior_residuals(&found.solution.x);
         all.iter().map(|residual| residual * residual).sum()
     }
 
     /// Sum of the squared residuals of values and jumps.
-    pub(super) fn chi2(&self, found: &Found) -> f64 {
+    pub(super) fn chi2(&self, found: &SearchedFit) -> f64 {
         found.solution.cost - self.squared_priors(found)
     }
 
     /// Creates the report of a result from this many initial values.
-    pub(super) fn report(&self, found: Found, rivals: &[Found], starts: usize) -> FitReport {
+    pub(super) fn report(
+        &self,
+        found: SearchedFit,
+        rivals: &[SearchedFit],
+        starts: usize,
+    ) -> FitReport {
         let (found, intervals) = self.with_intervals(found);
         let found = &found;
         let rivals = self.report_rivals(found, &intervals, rivals);
@@ -189,7 +194,7 @@ impl Search<'_> {
     }
 
     /// The columns with their residuals.
-    fn columns(&self, found: &Found) -> Vec<FittedColumn> {
+    fn columns(&self, found: &SearchedFit) -> Vec<FittedColumn> {
         let (case, data) = (self.problem.case, self.problem.data);
         let (x, point) = (&found.solution.x, &found.solution.point);
         let column = |(index, column): (usize, &Column)| {
@@ -229,7 +234,7 @@ impl Search<'_> {
     }
 
     /// Information about the parameters from the Jacobian at the best values.
-    pub(super) fn information(&self, found: &Found) -> Information {
+    pub(super) fn information(&self, found: &SearchedFit) -> Information {
         let parameters = self.problem.parameters.iter();
         let sizes: Vec<f64> = parameters
             .zip(&found.solution.x)
@@ -244,7 +249,7 @@ impl Search<'_> {
 
     /// The intervals of the parameters. If chi2 is lower near the best values, the fit continues
     /// from there.
-    fn with_intervals(&self, mut found: Found) -> (Found, Vec<[Option<f64>; 2]>) {
+    fn with_intervals(&self, mut found: SearchedFit) -> (SearchedFit, Vec<[Option<f64>; 2]>) {
         let mut rounds = MAX_CONTINUATIONS;
         loop {
             let information = self.information(&found);
@@ -283,7 +288,7 @@ impl Search<'_> {
     /// Half-widths of the intervals in standard errors. The variance of a parameter is a sum over
     /// the columns, whose noise is known with their own degrees of freedom (Satterthwaite,
     /// Biometrics Bulletin 2, 110 (1946)); given errors are known.
-    fn widths(&self, found: &Found, information: &Information) -> Vec<f64> {
+    fn widths(&self, found: &SearchedFit, information: &Information) -> Vec<f64> {
         let data = self.problem.data;
         let columns = data.columns.len();
         let jacobian = &found.solution.jacobian;
@@ -314,7 +319,7 @@ impl Search<'_> {
 
     /// Why the residuals are not noise, at a level of one and a half per cent: they are larger than the scatter
     /// that is known without the model, or keep their sign from row to row.
-    pub(super) fn not_noise(&self, found: &Found) -> Vec<String> {
+    pub(super) fn not_noise(&self, found: &SearchedFit) -> Vec<String> {
         let data = self.problem.data;
         let columns = &self.columns(found);
         let p_value = self.all_given().then(|| self.probability(found));
@@ -384,7 +389,7 @@ impl Search<'_> {
 
     /// Sum of the squared differences of a column, in units of the rows' relative errors, and their
     /// degrees of freedom, of the rows from which its scatter was not taken.
-    fn touched(&self, found: &Found, basis: &DMatrix<f64>, column: usize) -> (f64, f64) {
+    fn touched(&self, found: &SearchedFit, basis: &DMatrix<f64>, column: usize) -> (f64, f64) {
         let (x, point) = (&found.solution.x, &found.solution.point);
         let columns = self.problem.data.columns.len();
         let rows = self.problem.rows().into_iter().zip(point.iter());
@@ -401,7 +406,7 @@ impl Search<'_> {
     }
 
     /// Indices of the residuals of neighbouring rows in one direction, by column.
-    fn sequences(&self, found: &Found) -> Vec<Vec<Vec<usize>>> {
+    fn sequences(&self, found: &SearchedFit) -> Vec<Vec<Vec<usize>>> {
         let data = self.problem.data;
         let columns = data.columns.len();
         let of = |column: usize| {
@@ -430,26 +435,26 @@ impl Search<'_> {
     }
 
     /// True if one fit describes as much of the data better than another.
-    pub(super) fn is_better(&self, this: &Found, other: &Found) -> bool {
-        let deviance = |of: &Found| self.whole_criterion(of) + self.squared_jumps(of);
+    pub(super) fn is_better(&self, this: &SearchedFit, other: &SearchedFit) -> bool {
+        let deviance = |of: &SearchedFit| self.whole_criterion(of) + self.squared_jumps(of);
         this.jumps.len() >= other.jumps.len() && deviance(this) < deviance(other)
     }
 
     /// Akaike's criterion over all rows, where the values of one without an orbit count as residuals
     /// of their column's spread: between fits of one law, a lost row is no gain.
-    pub(super) fn whole_criterion(&self, found: &Found) -> f64 {
+    pub(super) fn whole_criterion(&self, found: &SearchedFit) -> f64 {
         let likelihood = self.likelihood(found);
         let deviance: f64 = likelihood.rows.iter().map(|row| row.deviance).sum();
         deviance + self.squared_priors(found) + 2.0 * likelihood.parameters as f64
     }
 
     /// Contribution of the jumps to chi2.
-    fn squared_jumps(&self, found: &Found) -> f64 {
+    fn squared_jumps(&self, found: &SearchedFit) -> f64 {
         self.jumps_off(found).map(|off| off * off).sum()
     }
 
     /// How far each jump is from the end of the model's branch, in standard errors of its place.
-    fn jumps_off(&self, found: &Found) -> impl Iterator<Item = f64> {
+    fn jumps_off(&self, found: &SearchedFit) -> impl Iterator<Item = f64> {
         let problem = self.problem_of(found);
         let (x, point) = (&found.solution.x, &found.solution.point);
         let off = (0..found.jumps.len()).map(|k| problem.jump_residual(x, point, k).abs());
@@ -458,7 +463,7 @@ impl Search<'_> {
 
     fn fitted(
         problem: &Problem<'_>,
-        found: &Found,
+        found: &SearchedFit,
         information: &Information,
         intervals: Vec<[Option<f64>; 2]>,
         shifts: Option<&[f64]>,
@@ -499,7 +504,7 @@ impl Search<'_> {
     fn by_stiffness(
         &self,
         problem: &Problem<'_>,
-        found: &Found,
+        found: &SearchedFit,
         information: &Information,
     ) -> Option<Vec<f64>> {
         let case = problem.case;
@@ -542,7 +547,7 @@ impl Search<'_> {
     }
 
     /// Lists the rows without an orbit, and the motion of the lever there.
-    fn without_orbit(&self, found: &Found) -> String {
+    fn without_orbit(&self, found: &SearchedFit) -> String {
         let (problem, x) = (&self.problem, &found.solution.x);
         let rows = problem.rows();
         let points = found.solution.point.iter();
@@ -605,7 +610,7 @@ impl Search<'_> {
     }
 
     /// Whether the residuals are as large as the variation of the data.
-    pub(super) fn is_nothing(&self, found: &Found) -> bool {
+    pub(super) fn is_nothing(&self, found: &SearchedFit) -> bool {
         let fitted = self.columns(found);
         let columns = fitted.iter().zip(&self.problem.data.columns);
         columns
@@ -616,7 +621,7 @@ impl Search<'_> {
     /// Determines why the model does not describe the data, and adds other warnings.
     fn judge(
         &self,
-        found: &Found,
+        found: &SearchedFit,
         p_value: Option<f64>,
         parameters: &[FittedParameter],
         misfit: &[String],
@@ -685,7 +690,7 @@ impl Search<'_> {
 }
 
 /// The rows with the model's values.
-fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
+fn rows(problem: &Problem<'_>, found: &SearchedFit) -> Vec<FittedRow> {
     let data = problem.data;
     let x = &found.solution.x;
     let rows = problem.rows().into_iter();
@@ -717,7 +722,7 @@ fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
 }
 
 /// The jumps of the data with their folds.
-fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
+fn jumps(problem: &Problem<'_>, found: &SearchedFit) -> Vec<FittedJump> {
     let (x, point) = (&found.solution.x, &found.solution.point);
     let rows = problem.rows();
     let jump = |(index, jump): (usize, &Jump)| {
@@ -737,7 +742,7 @@ fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
 }
 
 /// The values of the orbits on which the data are not.
-fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
+fn others(problem: &Problem<'_>, found: &SearchedFit) -> Vec<OtherOrbit> {
     let data = problem.data;
     let x = &found.solution.x;
     let chosen = branches_of(&found.solution.point);

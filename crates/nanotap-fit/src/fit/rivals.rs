@@ -20,7 +20,7 @@ use super::parameters::Target;
 use super::problem::{Rested, RowPoint};
 use super::quantity::RestQuantity;
 use super::report::{Rival, RivalParameter};
-use super::search::{Found, Search};
+use super::search::{Search, SearchedFit};
 
 /// Difference of Akaike's criterion up to which a minimum is within the reach of the data (Burnham &
 /// Anderson, Model Selection and Multimodel Inference, 2nd ed. 2002, Sect. 2.6).
@@ -63,7 +63,11 @@ const STIFFNESSES: [Key; 3] = [Key::SampleModulus, Key::SampleStiffness, Key::Al
 impl Search<'_> {
     /// Searches for the other minima of an accepted fit; returns the best one, and the others that
     /// are within reach. `others` were found before.
-    pub(super) fn rivals(&self, best: Found, others: Vec<Found>) -> (Found, Vec<Found>) {
+    pub(super) fn rivals(
+        &self,
+        best: SearchedFit,
+        others: Vec<SearchedFit>,
+    ) -> (SearchedFit, Vec<SearchedFit>) {
         let mut all = vec![best];
         all.extend(others);
         let rough = |x: Vec<f64>| self.rough_within(x, ROUGH_ROWS, ROUNDS);
@@ -88,7 +92,7 @@ impl Search<'_> {
             }
         });
         let best = all.swap_remove(least);
-        let mut rivals: Vec<Found> = Vec::new();
+        let mut rivals: Vec<SearchedFit> = Vec::new();
         for other in all {
             let known = rivals.iter().chain([&best]);
             let is_new = known.into_iter().all(|known| {
@@ -104,7 +108,7 @@ impl Search<'_> {
     }
 
     /// Initial values for the search: attraction and stiffness changed by a factor.
-    fn starts_of_rivals(&self, best: &Found) -> Vec<Vec<f64>> {
+    fn starts_of_rivals(&self, best: &SearchedFit) -> Vec<Vec<f64>> {
         let mut starts = Vec::new();
         let has = |keys: &[Key]| {
             let mut all = self.problem.parameters.iter();
@@ -141,7 +145,7 @@ impl Search<'_> {
 
     /// By how much Akaike's criterion of one fit is above that of another, over the rows where both
     /// have orbits.
-    fn above(&self, this: &Found, other: &Found) -> f64 {
+    fn above(&self, this: &SearchedFit, other: &SearchedFit) -> f64 {
         let [a, b] = [this, other].map(|of| self.likelihood(of));
         let rows = &a.with_orbit() & &b.with_orbit();
         let [a, b] = [a, b].map(|of| of.criteria(&rows)[0]);
@@ -152,11 +156,11 @@ impl Search<'_> {
     /// rival within all of them is not another one.
     pub(super) fn report_rivals(
         &self,
-        found: &Found,
+        found: &SearchedFit,
         intervals: &[[Option<f64>; 2]],
-        rivals: &[Found],
+        rivals: &[SearchedFit],
     ) -> Vec<Rival> {
-        let is_beyond = |rival: &&Found| {
+        let is_beyond = |rival: &&SearchedFit| {
             let mut all = rival.solution.x.iter().zip(intervals);
             all.any(|(value, [low, high])| {
                 low.is_some_and(|low| *value < low) || high.is_some_and(|high| *value > high)
@@ -170,7 +174,7 @@ impl Search<'_> {
         reported
     }
 
-    fn report_rival(&self, found: &Found, rival: &Found) -> Rival {
+    fn report_rival(&self, found: &SearchedFit, rival: &SearchedFit) -> Rival {
         let data = self.problem.data;
         let information = self.information(rival);
         let parameters = self.problem.parameters.iter().enumerate();
@@ -197,7 +201,11 @@ impl Search<'_> {
 
     /// What decides between two fits of force curves, and a sentence about it: the retract where it was not
     /// measured, or rows deeper in the sample.
-    fn decider_of_rests(&self, found: &Found, rival: &Found) -> (Option<String>, String) {
+    fn decider_of_rests(
+        &self,
+        found: &SearchedFit,
+        rival: &SearchedFit,
+    ) -> (Option<String>, String) {
         let data = self.problem.data;
         let column = &data.columns[0];
         let name = column.quantity.name();
@@ -242,7 +250,7 @@ impl Search<'_> {
     }
 
     /// The observable that decides between two fits, and a sentence about it.
-    fn decider(&self, found: &Found, rival: &Found) -> (Option<String>, String) {
+    fn decider(&self, found: &SearchedFit, rival: &SearchedFit) -> (Option<String>, String) {
         let data = self.problem.data;
         let names: Vec<&str> = data.columns.iter().map(|c| c.quantity.name()).collect();
         let amplitude = names.iter().position(|name| *name == "first_harmonic");
@@ -346,7 +354,7 @@ impl Search<'_> {
 }
 
 /// Whether values lie at a minimum, to first order in its residuals.
-fn is_same(found: &Found, x: &[f64]) -> bool {
+fn is_same(found: &SearchedFit, x: &[f64]) -> bool {
     let change = DVector::from_fn(x.len(), |k, _| x[k] - found.solution.x[k]);
     (&found.solution.jacobian * change).norm() < SAME
 }

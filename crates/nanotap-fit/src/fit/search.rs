@@ -27,7 +27,7 @@ pub(super) struct Search<'a> {
 }
 
 /// A fit with known branches.
-pub(super) struct Found {
+pub(super) struct SearchedFit {
     pub(super) solution: Solution<Point>,
     pub(super) noise: Vec<f64>,
     pub(super) jumps: Vec<Jump>,
@@ -68,8 +68,8 @@ const MAX_ROUNDS: usize = 6;
 
 impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
-        let mut best: Option<Found> = None;
-        let mut others: Vec<Found> = Vec::new();
+        let mut best: Option<SearchedFit> = None;
+        let mut others: Vec<SearchedFit> = Vec::new();
         let mut least_rough = 0.0;
         let mut tried = 0;
         for start in self.starts() {
@@ -245,9 +245,9 @@ impl<'a> Search<'a> {
     }
 
     /// Continues the fit to the minimum in standard errors.
-    pub(super) fn fine(&self, mut x: Vec<f64>) -> Option<Found> {
+    pub(super) fn fine(&self, mut x: Vec<f64>) -> Option<SearchedFit> {
         let mut noise = self.rough_noise();
-        let mut found: Option<Found> = None;
+        let mut found: Option<SearchedFit> = None;
         let mut steps = 0;
         for _ in 0..MAX_ROUNDS {
             if self.control.is_cancelled() {
@@ -256,7 +256,7 @@ impl<'a> Search<'a> {
             let problem = self.weighted(noise.clone(), None);
             // The parameters change little from here on; but a branch that ended too early reaches
             // its last row now.
-            let is_whole = |found: &&Found| !found.solution.point.iter().any(|row| row.lost);
+            let is_whole = |found: &&SearchedFit| !found.solution.point.iter().any(|row| row.lost);
             let known = found.as_ref().filter(is_whole);
             let known = known.map(|found| found.candidates.as_slice());
             let (mut point, candidates) = problem.discover(&x, known);
@@ -288,7 +288,7 @@ impl<'a> Search<'a> {
             let same = found
                 .as_ref()
                 .is_some_and(|found| branches_of(&found.solution.point) == branches);
-            found = Some(Found {
+            found = Some(SearchedFit {
                 solution,
                 noise: noise.clone(),
                 jumps: problem.jumps,
@@ -312,7 +312,7 @@ impl<'a> Search<'a> {
     }
 
     /// The same fit with other standard errors of the columns that give none.
-    fn with_noise(&self, mut found: Found, noise: Vec<f64>) -> Found {
+    fn with_noise(&self, mut found: SearchedFit, noise: Vec<f64>) -> SearchedFit {
         let columns = noise.len();
         for (row, of) in self.problem.data.rows().enumerate() {
             for (column, new) in noise.iter().enumerate() {
@@ -403,7 +403,7 @@ impl<'a> Search<'a> {
     }
 
     /// Mean squared residual relative to the spreads; rows without an orbit count fully.
-    fn misfit(&self, found: &Found) -> f64 {
+    fn misfit(&self, found: &SearchedFit) -> f64 {
         let data = self.problem.data;
         let (mut sum, mut count) = (0.0, 0);
         for (index, column) in data.columns.iter().enumerate() {
@@ -433,7 +433,7 @@ impl<'a> Search<'a> {
     }
 
     /// Number of measured values with an orbit, and of jumps, minus parameters.
-    pub(super) fn freedom(&self, found: &Found) -> usize {
+    pub(super) fn freedom(&self, found: &SearchedFit) -> usize {
         let (x, point) = (&found.solution.x, &found.solution.point);
         let columns = 0..self.problem.data.columns.len();
         let values: usize = columns.map(|c| self.differences(x, point, c).len()).sum();
@@ -443,14 +443,14 @@ impl<'a> Search<'a> {
     }
 
     /// True if the model describes the data: the residuals are small, or noise.
-    fn describes(&self, found: &Found) -> bool {
+    fn describes(&self, found: &SearchedFit) -> bool {
         (self.misfit(found) < MAX_MISFIT * ROUGH_ERROR * ROUGH_ERROR || self.leaves_noise(found))
             && (!self.all_given() || self.probability(found) > MIN_PROBABILITY)
     }
 
     /// True if no test distinguishes the residuals from noise and no parameter ended at a limit of
     /// what is physical.
-    fn is_trusted(&self, found: &Found) -> bool {
+    fn is_trusted(&self, found: &SearchedFit) -> bool {
         let all = self.problem.parameters.iter().zip(&found.solution.x);
         let mut limited = all.filter(|(p, _)| p.is_limited);
         let inside =
@@ -460,7 +460,7 @@ impl<'a> Search<'a> {
 
     /// True if the residuals are smaller than the spread, do not keep their sign from row to row,
     /// and have no outlier, as far as there are enough of them.
-    fn leaves_noise(&self, found: &Found) -> bool {
+    fn leaves_noise(&self, found: &SearchedFit) -> bool {
         let (x, point) = (&found.solution.x, &found.solution.point);
         let lost = point.iter().filter(|row| row.lost).count();
         let columns = self.problem.data.columns.iter().enumerate();
@@ -481,7 +481,7 @@ impl<'a> Search<'a> {
             })
     }
 
-    pub(super) fn probability(&self, found: &Found) -> f64 {
+    pub(super) fn probability(&self, found: &SearchedFit) -> f64 {
         exceeding(self.chi2(found), self.freedom(found) as f64)
     }
 }

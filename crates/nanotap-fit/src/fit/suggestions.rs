@@ -14,7 +14,7 @@ use nanotap_quantity::number::shortest;
 use super::parameters::{Parameter, Target, nuisance};
 use super::problem::Problem;
 use super::report::Suggestion;
-use super::search::{Found, Search};
+use super::search::{Search, SearchedFit};
 use super::solve::LeastSquares as _;
 use super::statistics::{range, span};
 use super::terms::{PERIODS, Term, periods};
@@ -57,7 +57,7 @@ struct Effect {
 
 impl Search<'_> {
     /// Corrections that the residuals of a fit show, the clearest first.
-    pub(super) fn suggestions(&self, found: &Found) -> Vec<Suggestion> {
+    pub(super) fn suggestions(&self, found: &SearchedFit) -> Vec<Suggestion> {
         // To first order nothing follows from a fit that has not found the curve.
         let lost = found.solution.point.iter().filter(|row| row.lost).count();
         if self.is_nothing(found) || 2 * lost > found.solution.point.len() {
@@ -105,7 +105,7 @@ impl Search<'_> {
     }
 
     /// The corrections that these data could have and that are not free.
-    fn candidates(&self, problem: &Problem<'_>, found: &Found) -> Option<Vec<Candidate>> {
+    fn candidates(&self, problem: &Problem<'_>, found: &SearchedFit) -> Option<Vec<Candidate>> {
         let data = self.problem.data;
         let mut names: Vec<(String, &str)> = Vec::new();
         for column in &data.columns {
@@ -159,7 +159,12 @@ impl Search<'_> {
     }
 
     /// Interference in a column, one candidate per period.
-    fn interference(&self, problem: &Problem<'_>, found: &Found, column: usize) -> Vec<Candidate> {
+    fn interference(
+        &self,
+        problem: &Problem<'_>,
+        found: &SearchedFit,
+        column: usize,
+    ) -> Vec<Candidate> {
         let data = self.problem.data;
         let name = format!("{}.interference", data.columns[column].name);
         let target = Target::Term(Term::Sine, column);
@@ -211,7 +216,7 @@ impl Search<'_> {
     /// The effect of a candidate on residuals, where `basis` spans what is free already.
     fn effect(
         &self,
-        found: &Found,
+        found: &SearchedFit,
         candidate: &Candidate,
         residuals: &DVector<f64>,
         basis: &DMatrix<f64>,
@@ -257,7 +262,7 @@ impl Search<'_> {
     /// of the residuals.
     fn fall_of_deviance(
         &self,
-        found: &Found,
+        found: &SearchedFit,
         before: &DVector<f64>,
         after: &DVector<f64>,
         basis: &DMatrix<f64>,

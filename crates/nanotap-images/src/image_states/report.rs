@@ -115,7 +115,7 @@ pub struct StateImages {
     #[schemars(extend("x-unit" = "m", "x-label" = "amplitude $A$"))]
     pub amplitude: Option<Vec<Vec<f64>>>,
     /// Phase as measured, degrees.
-    #[schemars(extend("x-unit" = "degree", "x-label" = "phase (°)"))]
+    #[schemars(extend("x-unit" = "degree", "x-label" = "phase"))]
     pub phase: Option<Vec<Vec<f64>>>,
 }
 

@@ -26,7 +26,7 @@ use nanotap_dynamics::{
 
 use crate::branch::kind_name;
 use crate::short_run::short_run;
-use crate::simulate::{Classification, Named};
+use crate::simulate::{Classification, NamedMotion};
 use nanotap_case::{Case, CaseError, Family};
 use nanotap_model::Model;
 use nanotap_model::model_map::ModelMap;
@@ -944,7 +944,7 @@ fn reachable(model: &Model, state: &[f64]) -> Vec<f64> {
 /// Classifies the motion that a run of a map reaches.
 fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> FoundMotion {
     let classified = classify(map, start, options);
-    let named = Named::of(&classified.kind);
+    let named = NamedMotion::of(&classified.kind);
     FoundMotion {
         classification: named.classification,
         evidence: named.evidence,

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Shape,
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Range, Scale, Shape,
 };
 use serde::Deserialize;
 
@@ -59,9 +59,9 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
         )
         .chain(of_drive(&["sader_jarvis_force"]));
     let mut curves = ApproachCurves {
-        x_label: format!("{symbol}{x_unit}"),
-        x_range: [report.to, report.from].map(|gap| x_factor * gap),
-        logarithmic: false,
+        x: Axis::linear(symbol)
+            .unit(x_unit)
+            .range(x_factor * report.to, x_factor * report.from),
         panels: panels.collect(),
     };
     if let Some((closest, share)) = kept {
@@ -73,13 +73,8 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
 /// Curves of approach and retract in the units of the figure.
 #[derive(Clone, Debug, Deserialize)]
 pub struct ApproachCurves {
-    /// Label of the distance axis, with its unit.
-    pub x_label: String,
-    /// Closest and farthest distance of the axis, in the unit of `x_label`.
-    pub x_range: [f64; 2],
-    /// Whether the distance axis is logarithmic, as for amplitudes at a constant least distance.
-    #[serde(default)]
-    pub logarithmic: bool,
+    /// Axis of the distance, or of the amplitude at a constant least distance.
+    pub x: Axis,
     /// Panels, one for each quantity.
     pub panels: Vec<ApproachPanel>,
 }
@@ -88,15 +83,13 @@ pub struct ApproachCurves {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct ApproachPanel {
-    /// Label of the quantity, with its unit.
-    pub label: String,
-    /// Natural size of the quantity in the unit of `label`, if known: see [`Axis::natural`].
-    pub natural: Option<f64>,
+    /// Axis of the quantity.
+    pub y: Axis,
     /// Whether the quantity is a phase, in degrees.
     pub phase: bool,
-    /// Motions on the approach: distance and quantity, in the units of the labels.
+    /// Motions on the approach: distance and quantity, in the units of the axes.
     pub approach: Vec<(f64, f64)>,
-    /// Motions on the retract: distance and quantity, in the units of the labels.
+    /// Motions on the retract: distance and quantity, in the units of the axes.
     pub retract: Vec<(f64, f64)>,
     /// Coexisting motions that neither approach nor retract reached: distance and quantity.
     pub coexisting: Vec<(f64, f64)>,
@@ -113,8 +106,10 @@ pub struct ApproachPanel {
 impl ApproachCurves {
     /// Replaces the distance by the amplitude `other(distance)` and removes panels without points.
     fn against(&mut self, other: impl Fn(f64) -> f64) {
-        self.x_range = self.x_range.map(&other);
-        self.logarithmic = true;
+        if let Range::Fixed(from, to) = self.x.range {
+            self.x = self.x.clone().range(other(from), other(to));
+        }
+        self.x.scale = Scale::Log;
         self.panels.retain(|panel| !panel.approach.is_empty());
         for panel in &mut self.panels {
             let curves = [&mut panel.approach, &mut panel.retract, &mut panel.compared];
@@ -132,14 +127,7 @@ impl ApproachCurves {
             .height(65.0 * rows as f64)
             .share_x();
         for (k, one) in self.panels.iter().enumerate() {
-            let [from, to] = self.x_range;
-            let x = if self.logarithmic {
-                Axis::log(&self.x_label)
-            } else {
-                Axis::linear(&self.x_label)
-            };
-            let x = x.range(from, to);
-            let panel = one.panel(x);
+            let panel = one.panel(self.x.clone());
             // One legend is enough.
             figure = figure.with(if k == 0 || !one.comparison.is_empty() {
                 panel.legend(Legend::Above)
@@ -189,7 +177,7 @@ impl ApproachPanel {
             _ => (Vec::new(), ""),
         };
         Self {
-            label: format!("{}{unit}", column.label),
+            y: Axis::linear(column.label).unit(unit),
             approach: scaled(approach),
             retract: scaled(retract),
             compared: scaled(compared),
@@ -210,8 +198,7 @@ impl ApproachPanel {
         };
         let size = |shown: PlottedQuantity| largest(&|observables| of(shown, observables));
         let natural = natural_of(shown, size);
-        let (label, factor) =
-            shown.axis(true, |kind| units.si(kind), scale_of(size(shown), natural));
+        let (y, factor) = shown.axis(true, |kind| units.si(kind), scale_of(size(shown), natural));
         let place =
             |gap: f64, observables: &Observables| (x_factor * gap, factor * of(shown, observables));
         let way = |way: Way| {
@@ -236,8 +223,7 @@ impl ApproachPanel {
             }
         });
         Self {
-            label,
-            natural: natural.map(|size| factor * size),
+            y: y.natural(natural.map(|size| factor * size)),
             phase: shown.is_phase(),
             approach: way(Way::Approach),
             retract: way(Way::Retract),
@@ -260,11 +246,7 @@ impl ApproachPanel {
     }
 
     fn panel(&self, x: Axis) -> Panel {
-        let y = Axis {
-            natural: self.natural,
-            ..Axis::linear(&self.label)
-        };
-        let mut panel = Panel::new(x, y);
+        let mut panel = Panel::new(x, self.y.clone());
         let grey = |points: Vec<(f64, f64)>| Line::new(points).colour(Colour::GREY).width(0.7);
         let branches: BTreeSet<usize> = self.branches.iter().map(|p| p.branch).collect();
         for branch in branches {

@@ -19,9 +19,9 @@ use nanotap_observe::{Observables, PhysicalMotion};
 /// Axis of a parameter: its label and the factor of its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterAxis {
-    /// Label of the axis, with its unit.
-    pub label: String,
-    /// Factor from the parameter's value in a report to the unit of `label`.
+    /// The axis, with its unit.
+    pub axis: Axis,
+    /// Factor from the parameter's value in a report to the unit of the axis.
     pub factor: f64,
 }
 
@@ -29,7 +29,7 @@ impl ParameterAxis {
     /// The parameter in the model's own units.
     pub fn of(key: Key) -> Self {
         Self {
-            label: key.label(),
+            axis: Axis::linear(key.label()),
             factor: 1.0,
         }
     }
@@ -45,12 +45,12 @@ impl ParameterAxis {
                 } else {
                     unit.quantity.to_owned()
                 };
-                let unit = match unit.kind {
+                let name = match unit.kind {
                     Kind::Number => String::new(),
-                    _ => format!(" ({name})"),
+                    _ => name,
                 };
                 Self {
-                    label: format!("{label}{unit}"),
+                    axis: Axis::linear(label).unit(name),
                     factor,
                 }
             },
@@ -129,7 +129,7 @@ pub fn branch_figure(
     };
     let natural = natural_of(shown, |shown| largest(&|p| value(shown, p)));
     let size = scale_of(largest(&|p| value(shown, p)), natural);
-    let (label, factor) = shown.axis(
+    let (y, factor) = shown.axis(
         beam,
         |kind| if si { Some(1.0) } else { units.si(kind) },
         size,
@@ -147,9 +147,8 @@ pub fn branch_figure(
         (first.factor * b.parameter, factor * value)
     };
     BranchCurves {
-        x_label: first.label.clone(),
-        y_label: label,
-        natural: natural.map(|size| factor * size),
+        x: first.axis.clone(),
+        y: y.natural(natural.map(|size| factor * size)),
         points: with_corners(points.collect(), &report.bifurcations, place),
         bifurcations: report
             .bifurcations
@@ -169,10 +168,11 @@ pub fn branch_figure(
             }))
             .collect(),
         curves: report.loci.as_ref().map(|loci| BifurcationCurves {
-            y_label: second.label.clone(),
-            x_range: [report.from.min(report.to), report.from.max(report.to)]
-                .map(|v| first.factor * v),
-            y_range: loci.range.map(|v| second.factor * v),
+            x: ranged(
+                &first.axis,
+                [report.from.min(report.to), report.from.max(report.to)].map(|v| first.factor * v),
+            ),
+            y: ranged(&second.axis, loci.range.map(|v| second.factor * v)),
             curves: loci
                 .curves
                 .iter()
@@ -188,6 +188,10 @@ pub fn branch_figure(
         }),
     }
     .figure()
+}
+
+fn ranged(axis: &Axis, [from, to]: [f64; 2]) -> Axis {
+    axis.clone().range(from, to)
 }
 
 /// Natural size of a quantity: for the dissipation the work of the peak force over the amplitude,
@@ -213,13 +217,10 @@ pub fn scale_of(size: f64, natural: Option<f64>) -> f64 {
 /// Branches in the units of the figure.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BranchCurves {
-    /// Label of the parameter's axis, with its unit.
-    pub x_label: String,
-    /// Label of the observable's axis, with its unit.
-    pub y_label: String,
-    /// Natural size of the observable in the unit of `y_label`, if known: see [`Axis::natural`].
-    #[serde(default)]
-    pub natural: Option<f64>,
+    /// Axis of the parameter.
+    pub x: Axis,
+    /// Axis of the observable.
+    pub y: Axis,
     /// The orbits, in the order in which they were followed.
     pub points: Vec<BranchPoint>,
     /// Bifurcations of the branches.
@@ -257,12 +258,10 @@ pub struct BranchMark {
 /// Curves of bifurcations in the plane of two parameters.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BifurcationCurves {
-    /// Label of the second parameter's axis, with its unit.
-    pub y_label: String,
-    /// Smallest and largest value of the first parameter, in the unit of its axis.
-    pub x_range: [f64; 2],
-    /// Smallest and largest value of the second parameter, in the unit of its axis.
-    pub y_range: [f64; 2],
+    /// Axis of the first parameter, with its range.
+    pub x: Axis,
+    /// Axis of the second parameter, with its range.
+    pub y: Axis,
     /// Curves in the plane of the two parameters.
     pub curves: Vec<BifurcationCurve>,
 }
@@ -298,16 +297,12 @@ impl BranchCurves {
                 .width(DOUBLE_COLUMN)
                 .height(88.0)
                 .with(branches)
-                .with(curves.panel(&self.x_label)),
+                .with(curves.panel()),
         }
     }
 
     fn panel(&self) -> Panel {
-        let y = Axis {
-            natural: self.natural,
-            ..Axis::linear(&self.y_label)
-        };
-        let mut panel = Panel::new(Axis::linear(&self.x_label).tight(), y).legend(Legend::Above);
+        let mut panel = Panel::new(self.x.clone().tight(), self.y.clone()).legend(Legend::Above);
         let mut parts: BTreeMap<(usize, usize), Vec<&BranchPoint>> = BTreeMap::new();
         for point in &self.points {
             parts
@@ -345,12 +340,8 @@ impl BranchCurves {
 }
 
 impl BifurcationCurves {
-    fn panel(&self, x_label: &str) -> Panel {
-        let mut panel = Panel::new(
-            Axis::linear(x_label).range(self.x_range[0], self.x_range[1]),
-            Axis::linear(&self.y_label).range(self.y_range[0], self.y_range[1]),
-        )
-        .legend(Legend::Above);
+    fn panel(&self) -> Panel {
+        let mut panel = Panel::new(self.x.clone(), self.y.clone()).legend(Legend::Above);
         let mut named: BTreeSet<(&str, usize)> = BTreeSet::new();
         let mut events: Vec<&str> = Vec::new();
         for curve in &self.curves {

@@ -32,8 +32,8 @@ pub fn contact_figure(
             .collect::<Vec<_>>();
         Line::new(points).colour(Colour::BLUE).width(0.8)
     };
-    let height_axis = || Axis::linear(format!("height over the sample{length_unit}"));
-    let force_axis = || Axis::linear(format!("force on the tip{force_unit}"));
+    let height_axis = || Axis::linear("height over the sample").unit(&length_unit);
+    let force_axis = || Axis::linear("force on the tip").unit(&force_unit);
     let contacts = contact_intervals(model, recording, periods as f64);
     let in_time = |y: Axis, line: Line| {
         let mut panel = Panel::new(time_axis(), y).legend(Legend::Above);

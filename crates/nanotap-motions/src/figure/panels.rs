@@ -9,6 +9,8 @@ use nanotap_figures::{
 use serde::Deserialize;
 
 use crate::simulate::Classification;
+use nanotap_case::physical::Kind;
+use nanotap_case::units::prefixed;
 
 /// Number of strobe states beyond which they are drawn as small dots.
 const FEW_STROBES: usize = 200;
@@ -19,9 +21,9 @@ const FEW_STROBES: usize = 200;
 pub struct MotionAxes {
     /// Whether the motion is that of a cantilever's tip.
     pub beam: bool,
-    /// Unit of lengths, as " (nm)"; empty in model units.
+    /// Unit of lengths, as `nm`; empty in model units.
     pub length: String,
-    /// Unit of velocities, as " (µm/s)"; empty in model units.
+    /// Unit of velocities, as `µm/s`; empty in model units.
     pub velocity: String,
 }
 
@@ -32,7 +34,7 @@ impl MotionAxes {
         } else {
             "displacement $x$"
         };
-        Axis::linear(format!("{label}{}", self.length))
+        Axis::linear(label).unit(&self.length)
     }
 
     pub(crate) fn rate(&self) -> Axis {
@@ -41,13 +43,33 @@ impl MotionAxes {
         } else {
             "velocity $dx/dt$"
         };
-        Axis::linear(format!("{label}{}", self.velocity))
+        Axis::linear(label).unit(&self.velocity)
     }
+}
+
+/// The axis of values up to `size` in SI, in the unit with the prefix that fits, and the factor of the
+/// values.
+pub fn si_axis(label: impl Into<String>, kind: Kind, size: f64) -> (Axis, f64) {
+    let axis = Axis::linear(label);
+    match (kind, kind.dimensional()) {
+        (Kind::Degrees, _) => (axis.unit("°"), 1.0),
+        (_, None) => (axis, 1.0),
+        (_, Some(kind)) => {
+            let (factor, unit) = prefixed(kind, 1.0, size);
+            (axis.unit(unit), factor)
+        }
+    }
+}
+
+/// Largest absolute value among finite ones, 0 without any.
+pub fn largest_of(values: impl IntoIterator<Item = f64>) -> f64 {
+    let finite = values.into_iter().filter(|value| value.is_finite());
+    finite.fold(0.0, |size: f64, value| size.max(value.abs()))
 }
 
 /// Axis of the time in drive periods.
 pub fn time_axis() -> Axis {
-    Axis::linear("time $τ / T$ (drive periods)").tight()
+    Axis::linear("time $τ / T$").unit("drive periods").tight()
 }
 
 /// One motion: points of time (in drive periods) and deflection, and of deflection and velocity.
@@ -142,7 +164,7 @@ pub struct OrbitCurves {
     pub motion: MotionCurves,
     /// Harmonics of the tip deflection: order and amplitude in `harmonics_unit`.
     pub harmonics: Vec<(f64, f64)>,
-    /// Unit of the amplitudes, as " (nm)"; empty in model units.
+    /// Unit of the amplitudes, as `nm`; empty in model units.
     pub harmonics_unit: String,
     /// Floquet multipliers as [Re, Im], dimensionless.
     pub multipliers: Vec<[f64; 2]>,
@@ -181,8 +203,8 @@ impl OrbitCurves {
         let axis = Axis::linear(format!("frequency / ${frequency}$"))
             .range(0.0, highest + 0.5)
             .marks(marks);
-        let amplitude = format!("amplitude {symbol}{}", self.harmonics_unit);
-        Panel::new(axis, Axis::log(amplitude)).with(Stems::new(stems).colour(Colour::BLUE))
+        let amplitude = Axis::log(format!("amplitude {symbol}")).unit(&self.harmonics_unit);
+        Panel::new(axis, amplitude).with(Stems::new(stems).colour(Colour::BLUE))
     }
 
     /// The multipliers and the unit circle.
@@ -362,10 +384,11 @@ impl SectionCurves {
             Some(phase) => Panel::new(self.axes.tip(), self.axes.rate())
                 .title(format!("at drive phase {:.0}°", 360.0 * phase)),
             None => Panel::new(
-                Axis::linear("drive phase at contact (°)")
+                Axis::linear("drive phase at contact")
+                    .unit("°")
                     .range(0.0, 360.0)
                     .marks([0.0, 90.0, 180.0, 270.0, 360.0].map(|d| (d, format!("{d:.0}")))),
-                Axis::linear(format!("impact speed{}", self.axes.velocity)),
+                Axis::linear("impact speed").unit(&self.axes.velocity),
             )
             .title("at the beginning of contacts"),
         };

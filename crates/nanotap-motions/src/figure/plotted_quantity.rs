@@ -5,6 +5,7 @@ use nanotap_case::Case;
 use nanotap_case::physical::Kind;
 use nanotap_case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use nanotap_case::units::prefixed;
+use nanotap_figures::Axis;
 use nanotap_observe::table::shown_phase;
 use nanotap_observe::{Dimension, Observable, Observables};
 
@@ -79,23 +80,28 @@ impl PlottedQuantity {
             .is_some_and(|o| o.dimension == Dimension::Angle)
     }
 
-    /// Label of the axis for values up to `size`, and the factor of the values. `beam` is true for
-    /// a cantilever, false for an oscillator. `si` gives the SI value of 1, if known; energies are
+    /// The axis for values up to `size`, and the factor of the values. `beam` is true for a
+    /// cantilever, false for an oscillator. `si` gives the SI value of 1, if known; energies are
     /// then in electronvolts.
-    pub fn axis(self, beam: bool, si: impl Fn(Kind) -> Option<f64>, size: f64) -> (String, f64) {
+    pub fn axis(self, beam: bool, si: impl Fn(Kind) -> Option<f64>, size: f64) -> (Axis, f64) {
         let Self::Observable(observable) = self else {
-            return ("largest |$μ$|".to_owned(), 1.0);
+            return (Axis::linear("largest |$μ$|"), 1.0);
         };
-        let label = observable.axis_label(beam);
-        let Some((kind, si)) = observable.dimension.kind().and_then(|k| Some((k, si(k)?))) else {
-            return (label, 1.0);
-        };
-        if kind == Kind::Energy {
-            // The electronvolt has the prefixes of the joule.
-            let (factor, unit) = prefixed(kind, si / JOULES_PER_ELECTRONVOLT, size);
-            return (format!("{label} ({})", unit.replace('J', "eV")), factor);
+        let axis = Axis::linear(observable.axis_label(beam));
+        if self.is_phase() {
+            return (axis.unit("°"), 1.0);
         }
-        let (factor, unit) = prefixed(kind, si, size);
-        (format!("{label} ({unit})"), factor)
+        let Some((kind, si)) = observable.dimension.kind().and_then(|k| Some((k, si(k)?))) else {
+            return (axis, 1.0);
+        };
+        let (factor, unit) = match kind {
+            // The electronvolt has the prefixes of the joule.
+            Kind::Energy => {
+                let (factor, unit) = prefixed(kind, si / JOULES_PER_ELECTRONVOLT, size);
+                (factor, unit.replace('J', "eV"))
+            }
+            _ => prefixed(kind, si, size),
+        };
+        (axis.unit(unit), factor)
     }
 }

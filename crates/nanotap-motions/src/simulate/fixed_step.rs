@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::simulate::{
-    Classification, Grid, Named, SimulateOptions, check_periods, check_states, is_none,
+    Classification, Grid, NamedMotion, SimulateOptions, check_periods, check_states, is_none,
     starting_state,
 };
 use nanotap_arithmetic::clock::Instant;
@@ -25,7 +25,8 @@ use nanotap_error::Error;
 use nanotap_model::model_map::ModelMap;
 use nanotap_model::{FlowError, Model};
 use nanotap_observe::ContactEventKind;
-use nanotap_observe::frame::{Frame, Rows, frame};
+use nanotap_observe::frame::Frame;
+use nanotap_observe::time_series;
 
 /// Drive periods discarded first, unless the options say otherwise.
 const TRANSIENT: usize = 500;
@@ -99,15 +100,13 @@ pub struct FixedStepRun {
 
 impl FixedStepRun {
     /// Time, tip displacement and its rate at every step of the first recorded periods.
-    pub fn curve_table(&self, units: Units) -> Frame<'_> {
-        frame! { Rows::new("curve", &self.curve, Some(units));
-            "tau", "", (Time, Digits(5)) => |p| p[0];
-            .si_name("time");
-            "tip", "", (Length, Digits(5)) => |p| p[1];
-            "tip_rate", "", (Velocity, Digits(5)) => |p| p[2];
-        }
+    pub fn curve_table(&self, units: Units) -> Frame<'static> {
+        let rows = self.curve.iter().map(|point| point.to_vec());
+        time_series::table(Vec::new(), rows.collect(), units)
     }
 }
+
+impl FixedStepRun {}
 
 /// Classification by the exact flow.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -197,7 +196,8 @@ pub fn fixed_step_run(model: &Model, options: &SimulateOptions) -> Result<FixedS
     let mut strobes = Vec::from(strobes);
     let (apparent_period, closure) = apparent_period(&strobes);
     let last = strobes.last().cloned().unwrap_or_default();
-    let named = Named::of(&classify(&mut ModelMap::new(model), &last, &options.classify()).kind);
+    let named =
+        NamedMotion::of(&classify(&mut ModelMap::new(model), &last, &options.classify()).kind);
     Ok(FixedStepRun {
         method: "rk4",
         steps,

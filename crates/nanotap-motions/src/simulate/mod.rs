@@ -177,7 +177,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     let events_left_out = record.events.len().saturating_sub(options.events);
     record.events.truncate(options.events);
     let kind = undecided.unwrap_or_else(|| classify(&mut map, &state, &how).kind);
-    let named = Named::of(&kind);
+    let named = NamedMotion::of(&kind);
     Ok(Simulation {
         periods: options.periods,
         transient,
@@ -384,7 +384,7 @@ pub(crate) fn torus_evidence(torus: &Torus) -> String {
 
 /// A verdict in the words of the output.
 #[derive(Clone, Debug)]
-pub struct Named {
+pub struct NamedMotion {
     /// Class of the motion.
     pub classification: Classification,
     /// The orbit, if it is periodic.
@@ -395,7 +395,7 @@ pub struct Named {
     pub evidence: String,
 }
 
-impl Named {
+impl NamedMotion {
     /// Translates a verdict into class, orbit, exponents and evidence.
     pub fn of(verdict: &MotionKind) -> Self {
         let (exponent, periodic) = (largest_exponent, orbit_evidence);

@@ -112,8 +112,8 @@ def _period_of(ds: "xr.Dataset") -> float:
 
 
 def _scale(*variables: "xr.DataArray", natural: float = 0.0) -> tuple[float, str]:
-    """What multiplies variables of one unit where they are drawn, and the unit in brackets: with
-    the prefix that fits if it is one of SI. A natural size replaces values that are rounding.
+    """What multiplies variables of one unit where they are drawn, and the unit: with the prefix
+    that fits if it is one of SI. A natural size replaces values that are rounding.
     """
     unit = str(variables[0].attrs.get("units", "1"))
     values = np.abs(np.concatenate([np.ravel(v.values) for v in variables]))
@@ -123,7 +123,7 @@ def _scale(*variables: "xr.DataArray", natural: float = 0.0) -> tuple[float, str
     of_taps = unit == "eV"
     factor, shown = _nanotap.axis("J" if of_taps else unit, size)
     shown = f"{shown.removesuffix('J')}eV" if of_taps else shown
-    return factor, f" ({shown})" if shown else ""
+    return factor, shown
 
 
 def _motion(
@@ -214,15 +214,15 @@ def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     }
 
 
-def _labelled(ds: "xr.Dataset", name: str, shown: str = "") -> str:
-    """The label of an axis, with the unit in brackets in which it is shown."""
-    if name in _LABELS:
-        return _LABELS[name] + shown
+def _axis_of(
+    ds: "xr.Dataset", name: str, shown: str = "", natural: float | None = None
+) -> dict[str, Any]:
+    """The axis of a variable, with the unit in which it is shown."""
     said = ds[name].attrs
-    words, unit = str(said.get("long_name", name)), str(said.get("units", "1"))
-    if shown or unit == "1":
-        return words + shown
-    return f"{words} ({unit})"
+    label = _LABELS.get(name, str(said.get("long_name", name)))
+    unit = str(said.get("units", "1"))
+    unit = shown or ("" if unit == "1" else unit)
+    return {"label": label, "unit": unit, "natural": natural}
 
 
 def _over_one(
@@ -266,8 +266,8 @@ def _over_one(
     for row in rows:
         row.update(x=x_scale * row["x"], y=y_scale * row["y"])
     facts = {
-        "x_label": _labelled(ds, name, x_unit),
-        "y_label": _labelled(ds, show, y_unit),
+        "x": _axis_of(ds, name, x_unit),
+        "y": _axis_of(ds, show, y_unit),
         "points": rows,
         "bifurcations": [],
         "curves": None,
@@ -397,10 +397,13 @@ def branch(
             y=y_scale
             * ds.get(f"bifurcation_{show}", ds.bifurcation_parameter * np.nan),
         )
-    symbol = ds.attrs["parameter_symbol"]
+    x = {
+        "label": _nanotap.label(name, ds.attrs["parameter_symbol"]),
+        "unit": x_unit,
+    }
     facts = {
-        "x_label": _nanotap.label(name, symbol) + x_unit,
-        "y_label": _labelled(ds, show, y_unit),
+        "x": x,
+        "y": _axis_of(ds, show, y_unit),
         "points": _rows(
             branch=ds.branch,
             period=ds.period,
@@ -409,7 +412,7 @@ def branch(
             y=y_scale * ds[show],
         ),
         "bifurcations": marks,
-        "curves": _curves(ds, name) if "locus_first" in ds else None,
+        "curves": _curves(ds, name, x) if "locus_first" in ds else None,
     }
     return _drawn("branch", facts, where)
 
@@ -421,24 +424,24 @@ def _rows(**columns: Any) -> list[dict[str, Any]]:
     return [row for row in rows if np.isfinite(row["x"]) and np.isfinite(row["y"])]
 
 
-def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
+def _curves(ds: "xr.Dataset", name: str, x: dict[str, Any]) -> dict[str, Any]:
     parts = [
         ds.isel(locus_point=ds.locus.values == one)
         for one in np.unique(ds.locus.values)
     ]
-    first, second = ds[name].values, ds.locus_second.values
+    (x_scale, _), (y_scale, y_unit) = _scale(ds[name]), _scale(ds.locus_second)
+    first, second = x_scale * ds[name].values, y_scale * ds.locus_second.values
+    symbol = ds.attrs.get("second_symbol", ds.attrs["second"])
+    y = {"label": _nanotap.label(ds.attrs["second"], symbol), "unit": y_unit}
     return {
-        "y_label": _nanotap.label(
-            ds.attrs["second"], ds.attrs.get("second_symbol", ds.attrs["second"])
-        ),
-        "x_range": [float(first.min()), float(first.max())],
-        "y_range": [float(second.min()), float(second.max())],
+        "x": x | {"range": {"fixed": [float(first.min()), float(first.max())]}},
+        "y": y | {"range": {"fixed": [float(second.min()), float(second.max())]}},
         "curves": [
             {
                 "kind": str(part.locus_kind.values[0]),
                 "period": int(part.locus_period.values[0]),
-                "x": part.locus_first.values.tolist(),
-                "y": part.locus_second.values.tolist(),
+                "x": (x_scale * part.locus_first.values).tolist(),
+                "y": (y_scale * part.locus_second.values).tolist(),
             }
             for part in parts
         ],
@@ -461,7 +464,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     in_si = distance.name == "zc"
     rows = [
         ("first_harmonic", "amplitude $A$"),
-        ("phase", "phase lag (°)"),
+        ("phase", "phase lag"),
         ("dissipation", "dissipation $E_{dis}$"),
         ("peak_force", "peak force $F_{max}$"),
     ]
@@ -517,8 +520,11 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
         at = "coexisting_zc" if in_si else "coexisting_gap"
         panels.append(
             {
-                "label": f"{label}{named}",
-                "natural": None if natural is None else natural * scale,
+                "y": {
+                    "label": label,
+                    "unit": named,
+                    "natural": None if natural is None else natural * scale,
+                },
                 "phase": name == "phase",
                 "approach": curve("approach"),
                 "retract": curve("retract"),
@@ -534,9 +540,12 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
         symbol = "amplitude $A$"
     ends = factor * distance.values
     facts = {
-        "x_label": f"{symbol}{unit}",
-        "x_range": [float(ends.min()), float(ends.max())],
-        "logarithmic": kept,
+        "x": {
+            "label": symbol,
+            "unit": unit,
+            "scale": "log" if kept else "linear",
+            "range": {"fixed": [float(ends.min()), float(ends.max())]},
+        },
         "panels": panels,
     }
     return _drawn("approach", facts, where)

@@ -9,8 +9,8 @@ use nanotap_figures::{
 use crate::reconstruct::{ForceCurve, ReconstructReport};
 use nanotap_case::physical::Kind;
 use nanotap_case::physical::quantity::JOULES_PER_ELECTRONVOLT;
-use nanotap_case::units::prefixed;
 use nanotap_motions::approach::Way;
+use nanotap_motions::figure::panels::{largest_of, si_axis};
 
 /// Half length of a bar in standard errors.
 const STANDARD_ERRORS: f64 = 2.0;
@@ -29,20 +29,10 @@ pub fn reconstruct_figure(report: &ReconstructReport) -> Figure {
         .with(dissipation_panel(report))
 }
 
-/// Factor and unit in brackets for values up to `size`.
-fn unit(report: &ReconstructReport, kind: Kind, size: f64) -> (f64, String) {
-    if report.physical {
-        let (factor, unit) = prefixed(kind, 1.0, size);
-        (factor, format!(" ({unit})"))
-    } else {
-        (1.0, String::new())
-    }
-}
-
-fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
-    values
-        .into_iter()
-        .fold(0.0, |size: f64, value| size.max(value.abs()))
+/// The axis of these values, and their factor.
+fn axis_of(report: &ReconstructReport, label: &str, kind: Kind, values: &[f64]) -> (Axis, f64) {
+    let kind = if report.physical { kind } else { Kind::Number };
+    si_axis(label, kind, largest_of(values.iter().copied()))
 }
 
 /// The rows of the table that are drawn: from the closest approach of a row of the data on.
@@ -58,11 +48,10 @@ fn shown(report: &ReconstructReport) -> Range<usize> {
 /// Axis of the distance, its factor, and the distances shown.
 fn distance(report: &ReconstructReport) -> (Axis, f64, [f64; 2]) {
     let nodes = &report.table.distance[shown(report)];
-    let (factor, unit) = unit(report, Kind::Length, largest(nodes));
+    let (axis, factor) = axis_of(report, "tip–sample distance $d$", Kind::Length, nodes);
     let (low, high) = (nodes[0], nodes[nodes.len() - 1]);
     let margin = 0.15 * (high - low);
     let range = [low - margin, high + margin];
-    let axis = Axis::linear(format!("tip–sample distance $d${unit}"));
     (
         axis.range(factor * range[0], factor * range[1]),
         factor,
@@ -92,8 +81,8 @@ fn force_panel(report: &ReconstructReport) -> Panel {
     let inside = |x: f64| (range[0]..=range[1]).contains(&x);
     let curve = &report.table;
     let shown = &curve.force[shown(report)];
-    let (factor, unit) = unit(report, Kind::Force, largest(shown));
-    let mut panel = Panel::new(axis, Axis::linear(format!("force on the tip{unit}")))
+    let (y, factor) = axis_of(report, "force on the tip", Kind::Force, shown);
+    let mut panel = Panel::new(axis, y)
         .legend(Legend::Above)
         .with(Rule::horizontal(0.0));
     let bars = Line::new(bars(curve, range, along, factor)).colour(Colour::GREY);
@@ -132,11 +121,12 @@ const fn way_colour(way: Option<Way>) -> Colour {
 fn dissipation_panel(report: &ReconstructReport) -> Panel {
     let (axis, along, range) = distance(report);
     let (factor, unit) = if report.physical {
-        (1.0 / JOULES_PER_ELECTRONVOLT, " (eV)")
+        (1.0 / JOULES_PER_ELECTRONVOLT, "eV")
     } else {
         (1.0, "")
     };
-    let mut panel = Panel::new(axis, Axis::linear(format!("dissipation $E_{{dis}}${unit}")))
+    let y = Axis::linear("dissipation $E_{dis}$").unit(unit);
+    let mut panel = Panel::new(axis, y)
         .legend(Legend::Above)
         .with(Rule::horizontal(0.0));
     for way in [Some(Way::Approach), Some(Way::Retract), None] {

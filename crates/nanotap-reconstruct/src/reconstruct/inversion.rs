@@ -20,8 +20,8 @@ use nanotap_flow::Complex;
 use rayon::prelude::*;
 
 use super::bias;
-use super::lever::{FirstHarmonic, Method};
-use super::motion::{Harmonics, Known, Motion, Weights};
+use super::lever_response::{FirstHarmonic, Method};
+use super::motion::{Harmonics, KnownForces, Motion, Weights};
 use super::nodes::{Kernel, Nodes};
 use super::smooth::Smooth;
 use nanotap_dynamics::control::Control;
@@ -235,7 +235,7 @@ impl Inversion<'_> {
                     estimate.closest = row.distance - estimate.at.amplitude;
                 }
             } else {
-                let known = Known {
+                let known = KnownForces {
                     nodes: &nodes,
                     force: &force.coefficients,
                     damping: &damping.coefficients,

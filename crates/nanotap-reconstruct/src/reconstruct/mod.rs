@@ -11,7 +11,7 @@
 
 mod bias;
 mod inversion;
-mod lever;
+mod lever_response;
 mod motion;
 mod nodes;
 mod report;
@@ -44,7 +44,7 @@ use nanotap_study::Study;
 use nanotap_study::value::Amount;
 
 use inversion::{Inversion, Inverted, Measured};
-use lever::{Lever, Method};
+use lever_response::{Lever, Method};
 use nodes::Kernel;
 use rows::{Excitation, Kind, Readings, floors};
 

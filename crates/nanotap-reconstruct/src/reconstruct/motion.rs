@@ -74,7 +74,7 @@ pub(super) struct Weights {
 
 /// Force and damping that are known, and how the lever's harmonics respond to a force at the tip.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known<'a> {
+pub(super) struct KnownForces<'a> {
     pub(super) nodes: &'a Nodes,
     pub(super) force: &'a [f64],
     pub(super) damping: &'a [f64],
@@ -82,7 +82,7 @@ pub(super) struct Known<'a> {
     pub(super) gains: &'a [Complex],
 }
 
-impl Known<'_> {
+impl KnownForces<'_> {
     /// Relaxation of the fixed-point iteration, smaller for a steeper force.
     fn relaxation(self) -> f64 {
         let nodes = &self.nodes.0;

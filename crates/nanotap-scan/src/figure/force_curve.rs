@@ -1,25 +1,22 @@
 //! The figure of a force curve: force against separation, deflection against distance.
 
-use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule,
-};
+use nanotap_case::physical::Kind;
+use nanotap_figures::{Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule};
 
 use crate::force_curve::{CurvePoint, ForceCurveReport, StaticPoint};
 use nanotap_motions::approach::Way;
+use nanotap_motions::figure::panels::{largest_of, si_axis};
 
-/// The coordinates of a point of the curve and of a rest.
+/// The coordinates of a point of the curve and of a rest, in SI.
 type Coordinates = (
     fn(&CurvePoint) -> (f64, f64),
     fn(&StaticPoint) -> (f64, f64),
 );
 
-const FORCE: Coordinates = (
-    |p| (1e9 * p.separation, 1e9 * p.force),
-    |p| (1e9 * p.separation, 1e9 * p.force),
-);
+const FORCE: Coordinates = (|p| (p.separation, p.force), |p| (p.separation, p.force));
 const DEFLECTION: Coordinates = (
-    |p| (1e9 * p.distance, 1e9 * p.deflection),
-    |p| (1e9 * p.distance, 1e9 * p.deflection),
+    |p| (p.distance, p.deflection),
+    |p| (p.distance, p.deflection),
 );
 
 /// Approach and retract with the branches of the lever at rest, stable and unstable, and the ends
@@ -27,21 +24,38 @@ const DEFLECTION: Coordinates = (
 /// lever are means over drive periods.
 pub fn force_curve_figure(report: &ForceCurveReport) -> Figure {
     let mean = if report.driven { "mean " } else { "" };
-    let [separation, force, deflection] = ["separation $d$ (nm)", "force (nN)", "deflection (nm)"]
-        .map(|label| format!("{mean}{label}"));
+    let [separation, force, deflection] =
+        ["separation $d$", "force", "deflection"].map(|label| format!("{mean}{label}"));
+    let forces = [
+        (separation.as_str(), Kind::Length),
+        (force.as_str(), Kind::Force),
+    ];
+    let deflections = [
+        ("distance $z$", Kind::Length),
+        (deflection.as_str(), Kind::Length),
+    ];
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .height(80.0)
-        .with(panel(report, FORCE, &separation, &force).legend(Legend::Above))
-        .with(panel(report, DEFLECTION, "distance $z$ (nm)", &deflection).legend(Legend::Hidden))
+        .with(panel(report, FORCE, forces).legend(Legend::Above))
+        .with(panel(report, DEFLECTION, deflections).legend(Legend::Hidden))
 }
 
-fn panel(report: &ForceCurveReport, (of, rest): Coordinates, x: &str, y: &str) -> Panel {
-    let mut panel = Panel::new(Axis::linear(x), Axis::linear(y)).with(Rule::horizontal(0.0));
+fn panel(
+    report: &ForceCurveReport,
+    (of, rest): Coordinates,
+    [(x, of_x), (y, of_y)]: [(&str, Kind); 2],
+) -> Panel {
+    let branches = || report.statics.branches.iter().flat_map(|b| &b.points);
+    let all = || report.points.iter().map(of).chain(branches().map(rest));
+    let (x, along) = si_axis(x, of_x, largest_of(all().map(|p| p.0)));
+    let (y, factor) = si_axis(y, of_y, largest_of(all().map(|p| p.1)));
+    let drawn = |(x, y): (f64, f64)| (along * x, factor * y);
+    let mut panel = Panel::new(x, y).with(Rule::horizontal(0.0));
     for stable in [true, false] {
         let branches = report.statics.branches.iter();
         for (k, branch) in branches.filter(|b| b.stable == stable).enumerate() {
-            let line = Line::new(branch.points.iter().map(rest))
+            let line = Line::new(branch.points.iter().map(|point| drawn(rest(point))))
                 .colour(Colour::GREY)
                 .width(2.0)
                 .dash(if stable { Dash::Solid } else { Dash::Dotted });
@@ -58,10 +72,11 @@ fn panel(report: &ForceCurveReport, (of, rest): Coordinates, x: &str, y: &str) -
     ];
     for (way, colour) in ways {
         let points = report.points.iter().filter(|point| point.way == way);
-        panel = panel.with(Line::new(points.map(of)).colour(colour).label(way.name()));
+        let line = Line::new(points.map(|point| drawn(of(point))));
+        panel = panel.with(line.colour(colour).label(way.name()));
     }
-    let ends = report.statics.jumps.iter().map(|jump| rest(&jump.before));
-    let ends: Vec<(f64, f64)> = ends.collect();
+    let jumps = report.statics.jumps.iter();
+    let ends: Vec<(f64, f64)> = jumps.map(|jump| drawn(rest(&jump.before))).collect();
     if !ends.is_empty() {
         panel = panel.with(
             Markers::new(ends)

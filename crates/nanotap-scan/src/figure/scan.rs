@@ -5,15 +5,25 @@ use nanotap_figures::{
     Panel, Rule,
 };
 
+use nanotap_case::physical::Kind;
+use nanotap_motions::figure::panels::{largest_of, si_axis};
+
 use crate::scan::{CHANNELS, Channel, Interaction, Mode, ScanReport};
 
-/// Channels that are drawn: label, factor from SI, and values.
-fn drawn() -> impl Iterator<Item = (String, f64, &'static Channel)> {
+/// Channels that are drawn: axis, factor from SI, and values.
+fn drawn(report: &ScanReport) -> impl Iterator<Item = (Axis, f64, &'static Channel)> {
     let names = ["height", "amplitude_error", "phase", "peak_force_max"];
     let channels = CHANNELS
         .iter()
         .filter(move |channel| names.contains(&channel.name));
-    channels.map(|channel| (channel.axis().0, channel.axis().1, channel))
+    channels.map(|channel| {
+        let images = report
+            .directions()
+            .flat_map(|(_, image)| (channel.values)(image));
+        let size = largest_of(images.flatten().copied());
+        let (axis, factor) = si_axis(channel.label, channel.dimension.entry(), size);
+        (axis, factor, channel)
+    })
 }
 
 /// Height, amplitude error, phase and largest peak force: of one line against the position, in both
@@ -27,17 +37,13 @@ pub fn scan_figure(report: &ScanReport) -> Figure {
     figure.caption(&report.verdict)
 }
 
-/// Positions in µm where lines are long, else in nm, with the unit.
-fn along(report: &ScanReport) -> (f64, &'static str) {
-    if report.size[0] >= 2e-6 {
-        (1e6, "position $x$ (µm)")
-    } else {
-        (1e9, "position $x$ (nm)")
-    }
+/// Axis of the position, and the factor of positions.
+fn along(report: &ScanReport) -> (Axis, f64) {
+    si_axis("position $x$", Kind::Length, report.size[0])
 }
 
 fn line_figure(report: &ScanReport) -> Figure {
-    let (factor, label) = along(report);
+    let (x, factor) = along(report);
     let positions = report.pixel_positions();
     let of = |values: &[f64], scale: f64| -> Vec<(f64, f64)> {
         let both = positions.iter().zip(values);
@@ -48,9 +54,9 @@ fn line_figure(report: &ScanReport) -> Figure {
         .height(180.0)
         .row_heights([1.6, 1.0, 1.0, 1.3])
         .share_x();
-    for (k, (title, scale, channel)) in drawn().enumerate() {
-        let x = Axis::linear(label).range(0.0, factor * report.size[0]);
-        let mut panel = Panel::new(x, Axis::linear(title));
+    for (k, (y, scale, channel)) in drawn(report).enumerate() {
+        let x = x.clone().range(0.0, factor * report.size[0]);
+        let mut panel = Panel::new(x, y);
         for change in &report.branch_changes {
             panel = panel.with(Rule::vertical(factor * change.x));
         }
@@ -114,13 +120,13 @@ fn bands(report: &ScanReport, factor: f64, state: Interaction) -> Vec<(f64, f64)
 }
 
 fn image_figure(report: &ScanReport) -> Figure {
-    let (factor, label) = along(report);
+    let (x, factor) = along(report);
     let size = report.size.map(|size| factor * size);
     let mut figure = Figure::new(2, 2).width(DOUBLE_COLUMN).height(150.0);
-    for (title, scale, channel) in drawn() {
+    for (colours, scale, channel) in drawn(report) {
         let rows = (channel.values)(&report.trace);
-        let x = Axis::linear(label).tight();
-        let y = Axis::linear(label.replace("$x$", "$y$")).tight();
+        let x = x.clone().tight();
+        let y = Axis::linear("position $y$").unit(&x.unit).tight();
         let pixels = rows.iter().flatten().map(|value| scale * value);
         figure = figure.with(Panel::new(x, y).with(Heatmap::new(
             rows[0].len(),
@@ -128,7 +134,7 @@ fn image_figure(report: &ScanReport) -> Figure {
             pixels,
             (0.0, size[0]),
             (0.0, size[1]),
-            Axis::linear(title),
+            colours,
         )));
     }
     figure

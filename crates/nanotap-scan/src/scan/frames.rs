@@ -2,7 +2,6 @@
 
 use super::instrument::Interaction;
 use super::report::{CHANNELS, Channel, Channels, Direction, LineStatistics, ScanReport};
-use nanotap_case::quantity::prefix_of;
 use nanotap_dataset::gsf::Field;
 use nanotap_observe::frame::{AsCell, Cell, Form, Frame, Rows, columns, finite, frame};
 
@@ -10,16 +9,6 @@ impl Channel {
     /// SI unit in files; empty for a number without unit.
     pub const fn unit(&self) -> &'static str {
         self.dimension.file_unit()
-    }
-
-    /// Label of an axis with its unit, the factor from SI to it, and the values.
-    pub fn axis(&self) -> (String, f64) {
-        let prefix = prefix_of(self.power).unwrap_or_default();
-        let label = match self.power {
-            0 => self.label.to_owned(),
-            _ => format!("{} ({prefix}{})", self.label, self.unit()),
-        };
-        (label, 10f64.powi(-self.power))
     }
 }
 

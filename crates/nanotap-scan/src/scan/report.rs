@@ -234,7 +234,7 @@ channels! {
     /// Mean of amplitude minus setpoint in a pixel, m.
     amplitude_error: Length, "amplitude error", "amplitude error", -9;
     /// Phase of the mean output of the lock-in amplifier, degrees.
-    phase: Angle, "phase lag", "phase lag (°)", 0;
+    phase: Angle, "phase lag", "phase lag", 0;
     /// Mean peak force in a pixel, N: the mean of the periods' largest forces.
     peak_force: Force, "mean peak force", "mean peak force", -9;
     /// Largest peak force in a pixel, N.

@@ -8,11 +8,11 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
-use crate::basin::{BEHIND, FAILED, Known, UNBOUNDED, UNSETTLED, entries, known, labels};
+use crate::basin::{BEHIND, BasinAttractor, FAILED, UNBOUNDED, UNSETTLED, entries, known, labels};
 use nanotap_case::physical::Kind;
-use nanotap_case::units::prefixed;
 use nanotap_dataset::{Store, StoreError};
 use nanotap_motions::figure::panels::motion_of;
+use nanotap_motions::figure::panels::si_axis;
 
 /// The attractors that are reached from the points of a slice of states.
 #[derive(Clone, Debug, Deserialize)]
@@ -31,7 +31,7 @@ pub struct BasinTable {
     #[serde(default = "no_units")]
     pub si: [f64; 2],
     /// Attractors of the dataset, with their states at drive phase 0 in model units.
-    pub attractors: Vec<Known>,
+    pub attractors: Vec<BasinAttractor>,
     /// Names of the entries of a state.
     pub entries: Vec<String>,
     /// Number of the attractor that is reached from each point, row by row from the smallest y;
@@ -109,7 +109,7 @@ impl BasinTable {
         for (_, name, colour) in others {
             layer = layer.category_in(name, colour);
         }
-        let mut panel = Panel::new(Axis::linear(x.label).tight(), Axis::linear(y.label).tight())
+        let mut panel = Panel::new(x.axis.tight(), y.axis.tight())
             .with(layer)
             .legend(Legend::Right);
         let place = |name: &str| self.entries.iter().position(|n| n == name);
@@ -137,18 +137,18 @@ impl BasinTable {
     }
 }
 
-fn motion(attractor: &Known) -> Motion {
+fn motion(attractor: &BasinAttractor) -> Motion {
     attractor
         .period
         .map_or_else(|| motion_of(&attractor.classification), Motion::Periodic)
 }
 
 struct Side {
-    /// Outer edges of the first and last cell, in the unit of `label`.
+    /// Outer edges of the first and last cell, in the unit of the axis.
     ends: (f64, f64),
-    /// Factor from the model's unit to the unit of `label`.
+    /// Factor from the model's unit to the unit of the axis.
     factor: f64,
-    label: String,
+    axis: Axis,
 }
 
 impl Side {
@@ -159,19 +159,17 @@ impl Side {
         let kind = match name.chars().next() {
             Some('a') if si != 1.0 => Kind::Length,
             Some('v') if si != 1.0 => Kind::Velocity,
-            _ => {
-                return Self {
-                    ends: (low, high),
-                    factor: 1.0,
-                    label: symbol(name),
-                };
-            }
+            _ => Kind::Number,
         };
-        let (scale, unit) = prefixed(kind, 1.0, low.abs().max(high.abs()));
+        let (axis, scale) = si_axis(symbol(name), kind, low.abs().max(high.abs()));
         Self {
+            axis,
             ends: (scale * low, scale * high),
-            factor: scale * si,
-            label: format!("{} ({unit})", symbol(name)),
+            factor: if kind == Kind::Number {
+                1.0
+            } else {
+                scale * si
+            },
         }
     }
 }

@@ -1,19 +1,34 @@
 //! The figure of bimodal operation: what the loops let change of each tone, the largest force, and
 //! the moduli of the formula and of the sample.
 
-use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Rule};
+use nanotap_case::physical::Kind;
+use nanotap_figures::{Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Rule};
+use nanotap_motions::figure::panels::{largest_of, si_axis};
 
-use crate::bimodal::{BimodalPoint, BimodalReport};
+use crate::bimodal::{BimodalPoint, BimodalReport, ToneReading};
 
-/// A quantity against the distance in nm.
-fn panel(report: &BimodalReport, label: &str, of: impl Fn(&BimodalPoint) -> Option<f64>) -> Panel {
-    let curve = report
-        .table
-        .iter()
-        .filter_map(|p| Some((1e9 * p.zc, of(p)?)));
-    Panel::new(Axis::linear("distance $z_c$ (nm)"), Axis::linear(label))
+/// What a panel shows of each point.
+type Shown<'a> = &'a dyn Fn(&BimodalPoint) -> Option<f64>;
+
+/// A quantity in SI against the distance, and the factor to its drawn values. `also`: a further value
+/// that is drawn.
+fn panel(
+    report: &BimodalReport,
+    label: String,
+    kind: Kind,
+    of: Shown<'_>,
+    also: Option<f64>,
+) -> (Panel, f64) {
+    let distances = report.table.iter().map(|p| p.zc);
+    let (x, along) = si_axis("distance $z_c$", Kind::Length, largest_of(distances));
+    let values = report.table.iter().filter_map(of).chain(also);
+    let (y, factor) = si_axis(label, kind, largest_of(values));
+    let drawn = |p: &BimodalPoint| Some((along * p.zc, factor * of(p)?));
+    let curve = report.table.iter().filter_map(drawn);
+    let panel = Panel::new(x, y)
         .legend(Legend::Hidden)
-        .with(Line::new(curve).colour(Colour::BLUE))
+        .with(Line::new(curve).colour(Colour::BLUE));
+    (panel, factor)
 }
 
 /// The panels of a tone: amplitude and phase where its loop does not hold them, frequency shift and
@@ -21,22 +36,23 @@ fn panel(report: &BimodalReport, label: &str, of: impl Fn(&BimodalPoint) -> Opti
 fn of_tone(report: &BimodalReport, k: usize) -> [Panel; 2] {
     let n = k + 1;
     let kind = report.loops[k];
+    let shown = |label: String, kind: Kind, of: fn(&ToneReading) -> f64| {
+        panel(report, label, kind, &|p| Some(of(&p.tones[k])), None).0
+    };
     let by_phase = if kind.holds_phase() {
-        panel(report, &format!("shift $Δf_{n}$ (Hz)"), |p| {
-            Some(p.tones[k].frequency_shift)
+        shown(format!("shift $Δf_{n}$"), Kind::Frequency, |tone| {
+            tone.frequency_shift
         })
     } else {
-        panel(report, &format!("lag $φ_{n}$ (°)"), |p| {
-            Some(p.tones[k].phase)
-        })
+        shown(format!("lag $φ_{n}$"), Kind::Degrees, |tone| tone.phase)
     };
     let by_amplitude = if kind.holds_amplitude() {
-        panel(report, &format!("drive {n} / free drive"), |p| {
-            Some(p.tones[k].drive_ratio)
+        shown(format!("drive {n} / free drive"), Kind::Number, |tone| {
+            tone.drive_ratio
         })
     } else {
-        panel(report, &format!("amplitude $A_{n}$ (nm)"), |p| {
-            Some(1e9 * p.tones[k].amplitude)
+        shown(format!("amplitude $A_{n}$"), Kind::Length, |tone| {
+            tone.amplitude
         })
     };
     [by_amplitude, by_phase]
@@ -46,12 +62,14 @@ fn of_tone(report: &BimodalReport, k: usize) -> [Panel; 2] {
 pub fn bimodal_figure(report: &BimodalReport) -> Figure {
     let mut figure = Figure::new(2, 3).width(DOUBLE_COLUMN).height(110.0);
     let [first, second] = [0, 1].map(|k| of_tone(report, k));
-    let force = panel(report, "largest force (nN)", |p| Some(1e9 * p.peak_force));
-    let mut modulus = panel(report, "$E^*$ by formula (MPa)", |p| {
-        p.estimates.reduced_modulus.map(|value| 1e-6 * value)
-    });
-    if let Some(exact) = report.reduced_modulus {
-        modulus = modulus.with(Rule::horizontal(1e-6 * exact));
+    let force = |p: &BimodalPoint| Some(p.peak_force);
+    let (force, _) = panel(report, "largest force".into(), Kind::Force, &force, None);
+    let estimate = |p: &BimodalPoint| p.estimates.reduced_modulus;
+    let label = "$E^*$ by formula".to_owned();
+    let exact = report.reduced_modulus;
+    let (mut modulus, factor) = panel(report, label, Kind::Pressure, &estimate, exact);
+    if let Some(exact) = exact {
+        modulus = modulus.with(Rule::horizontal(factor * exact));
     }
     let [a, b] = first;
     let [c, d] = second;

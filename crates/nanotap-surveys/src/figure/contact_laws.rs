@@ -40,8 +40,8 @@ fn force_panel(comparison: &Comparison, units: &Units) -> Panel {
     let (length, length_unit) = units.axis(Kind::Length, largest(curves().map(|p| p[0])));
     let (force, force_unit) = units.axis(Kind::Force, largest(curves().map(|p| p[1])));
     let mut panel = Panel::new(
-        Axis::linear(format!("gap $d${length_unit}")).tight(),
-        Axis::linear(format!("force on the tip{force_unit}")),
+        Axis::linear("gap $d$").unit(length_unit).tight(),
+        Axis::linear("force on the tip").unit(force_unit),
     )
     .legend(Legend::Above)
     .with(Rule::horizontal(0.0));
@@ -64,9 +64,10 @@ fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
     let (force, force_unit) = units.axis(Kind::Force, strongest);
     let mut panel = Panel::new(
         // Most of the flight is beyond the range of the force.
-        Axis::linear(format!("indentation $-V_T${length_unit}"))
+        Axis::linear("indentation $-V_T$")
+            .unit(length_unit)
             .range(-0.25 * length * deepest, 1.05 * length * deepest),
-        Axis::linear(format!("force on the tip{force_unit}")),
+        Axis::linear("force on the tip").unit(force_unit),
     )
     .legend(Legend::Above)
     .with(Rule::horizontal(0.0));
@@ -98,12 +99,14 @@ fn followed_panel(comparison: &Comparison, shown: &str, units: &Units) -> Panel 
             .map_or_else(Vec::new, |b| b.points.clone())
     };
     let all: Vec<PointReport> = comparison.samples.iter().flat_map(points).collect();
-    let (label, factor) = shown.axis(true, |kind| units.si(kind), largest(all.iter().map(value)));
+    let (y, factor) = shown.axis(true, |kind| units.si(kind), largest(all.iter().map(value)));
     let (frequency, frequency_unit) =
         units.axis(Kind::Frequency, largest(all.iter().map(|p| p.parameter)));
     let mut panel = Panel::new(
-        Axis::linear(format!("drive frequency $Ω${frequency_unit}")).tight(),
-        Axis::linear(label),
+        Axis::linear("drive frequency $Ω$")
+            .unit(frequency_unit)
+            .tight(),
+        y,
     );
     for (k, sample) in comparison.samples.iter().enumerate() {
         let Some(branch) = &sample.branch else {

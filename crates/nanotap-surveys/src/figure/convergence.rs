@@ -33,11 +33,8 @@ pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
     let unit = drawn.last().map_or((1.0, String::new()), |(_, _, _, tip)| {
         units.axis(Kind::Length, largest(tip))
     });
-    let mut overlay = Panel::new(
-        time_axis(),
-        Axis::linear(format!("tip deflection $W${}", unit.1)),
-    )
-    .legend(Legend::Above);
+    let mut overlay = Panel::new(time_axis(), Axis::linear("tip deflection $W$").unit(unit.1))
+        .legend(Legend::Above);
     for (i, model, motion, tip) in &drawn {
         let period = model.period();
         let curve = instants(tip, period, motion.end() / period)

@@ -13,6 +13,7 @@ use nanotap_case::physical::Kind;
 use nanotap_case::units::prefixed;
 use nanotap_dataset::{Coordinate, Store, StoreError, Values};
 use nanotap_motions::figure::branch::{natural_of, scale_of};
+use nanotap_motions::figure::panels::largest_of;
 use nanotap_motions::figure::plotted_quantity::PlottedQuantity;
 use nanotap_motions::simulate::Classification;
 use nanotap_observe::table::shown_phase;
@@ -337,11 +338,7 @@ fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
     if units != "m" {
         return (1.0, String::new());
     }
-    let size = values
-        .filter(|v| v.is_finite())
-        .fold(0.0, |size: f64, v| size.max(v.abs()));
-    let (factor, unit) = prefixed(Kind::Length, 1.0, size);
-    (factor, unit.clone())
+    prefixed(Kind::Length, 1.0, largest_of(values))
 }
 
 /// The figure of a finished dataset: a bifurcation diagram over one parameter, a map of
@@ -373,10 +370,7 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         .width(ONE_AND_A_HALF_COLUMNS)
         .height(120.0)
         .share_x();
-    for (name, label) in [
-        ("first_harmonic", "amplitude $A$"),
-        ("phase", "phase lag (°)"),
-    ] {
+    for (name, label) in [("first_harmonic", "amplitude $A$"), ("phase", "phase lag")] {
         let index = schema.index_of(name).unwrap_or(0);
         let mut curves: BTreeMap<(String, usize), Vec<(f64, f64)>> = BTreeMap::new();
         for chunk in 0..store.chunks() {
@@ -393,7 +387,10 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         }
         let units = schema.variables[index].attributes.get("units");
         let units = units.and_then(|unit| unit.as_str()).unwrap_or_default();
-        let (factor, unit) = deflection(units, curves.values().flatten().map(|p| p.1));
+        let (factor, unit) = match units {
+            "degree" => (1.0, "°".to_owned()),
+            units => deflection(units, curves.values().flatten().map(|p| p.1)),
+        };
         let mut panel =
             Panel::new(x.axis(), Axis::linear(label).unit(unit)).legend(if name == "phase" {
                 Legend::Hidden
@@ -438,10 +435,7 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
     for shown in SHOWN.into_iter().filter_map(PlottedQuantity::named) {
         values.push((shown, of_first_start(store, shown)?));
     }
-    let size = |values: &[f64]| {
-        let known = values.iter().filter(|v| v.is_finite());
-        known.fold(0.0, |size: f64, v| size.max(v.abs()))
-    };
+    let size = |values: &[f64]| largest_of(values.iter().copied());
     let largest = |wanted: PlottedQuantity| {
         let found = values.iter().find(|(shown, _)| *shown == wanted);
         found.map_or(0.0, |(_, (of, _))| size(of))
@@ -449,13 +443,14 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
     for (shown, (of, in_si)) in &values {
         let natural = natural_of(*shown, largest);
         let si = |_| in_si.then_some(1.0);
-        let (label, factor) = shown.axis(true, si, scale_of(size(of), natural));
-        let scale = Axis {
-            natural: natural.map(|size| factor * size),
-            ..Axis::linear("")
-        };
+        let (title, factor) = shown.axis(true, si, scale_of(size(of), natural));
+        let scale = Axis::linear("").natural(natural.map(|size| factor * size));
         let layer = GridScale::heatmap(&x, &y, of.iter().map(|v| factor * v), scale);
-        figure = figure.with(Panel::new(x.axis(), y.axis()).with(layer).title(label));
+        figure = figure.with(
+            Panel::new(x.axis(), y.axis())
+                .with(layer)
+                .title(title.words()),
+        );
     }
     Ok(figure)
 }

@@ -16,7 +16,7 @@ use nanotap_model::model_map::ModelMap;
 use nanotap_model::{Model, MotionError};
 use nanotap_motions::map::UNINTERRUPTED;
 use nanotap_motions::short_run::short_run;
-use nanotap_motions::simulate::{Classification, Named};
+use nanotap_motions::simulate::{Classification, NamedMotion};
 use nanotap_observe::time_series::with_modes;
 use nanotap_observe::{ObservableSet, Observables, RecordOptions, Recorded, Recorder};
 use nanotap_study::start_box::{box_with, default_starts};
@@ -115,7 +115,7 @@ impl Outcome {
         }
     }
 
-    fn named(named: &Named, transient: usize) -> Self {
+    fn named(named: &NamedMotion, transient: usize) -> Self {
         let mut outcome = Self::unknown(named.classification, transient);
         if let Some(orbit) = &named.orbit {
             outcome.period = orbit.period;
@@ -276,7 +276,7 @@ impl<'a> Runner<'a> {
     /// The motion that the run was found to go to.
     fn classified(&mut self, start: &[f64]) -> (Outcome, Option<Vec<f64>>) {
         let classified = self.beside_known(start);
-        let named = Named::of(&classified.kind);
+        let named = NamedMotion::of(&classified.kind);
         let outcome = Outcome::named(&named, classified.periods);
         match &named.orbit {
             Some(orbit) => {
@@ -354,11 +354,11 @@ impl<'a> Runner<'a> {
 
     /// Classifies the motion from `state`. If it is on an orbit that an earlier start reached, that
     /// orbit is the result.
-    fn kind_of(&mut self, state: &[f64]) -> Named {
+    fn kind_of(&mut self, state: &[f64]) -> NamedMotion {
         if let Some(orbit) = self.known.iter().find(|orbit| is_on(orbit, state)) {
-            return Named::of(&MotionKind::Periodic(orbit.clone()));
+            return NamedMotion::of(&MotionKind::Periodic(orbit.clone()));
         }
-        let named = Named::of(&self.beside_known(state).kind);
+        let named = NamedMotion::of(&self.beside_known(state).kind);
         self.known.extend(named.orbit.clone());
         named
     }

@@ -159,8 +159,8 @@ pub fn law(
 
 /// The parameter of a formula that a case states under `[sample.parameters]`.
 fn parameter(name: &str, dimension: Dimension) -> Option<ParameterEntry> {
-    type Named = (String, Dimension);
-    static PARAMETERS_OF_ALL: LazyLock<Mutex<HashMap<Named, ParameterEntry>>> =
+    type FormulaParameter = (String, Dimension);
+    static PARAMETERS_OF_ALL: LazyLock<Mutex<HashMap<FormulaParameter, ParameterEntry>>> =
         LazyLock::new(Mutex::default);
     let mut all = PARAMETERS_OF_ALL
         .lock()

@@ -79,6 +79,8 @@ pub struct StudyEntry {
     pub dataset: Option<Run<DatasetPlan>>,
     /// The summary of its finished dataset, if it leaves one.
     pub summary: Option<Summarise>,
+    /// Kind of the datasets that are this study's alone.
+    pub kind: Option<&'static str>,
 }
 
 /// What summarises a finished dataset and draws it.
@@ -184,6 +186,7 @@ impl StudyEntry {
             }),
             dataset: None,
             summary: None,
+            kind: None,
         }
     }
 
@@ -193,12 +196,14 @@ impl StudyEntry {
             any_distance,
             dataset,
             summary,
+            kind,
             ..
         } = Self::dataset::<S>();
         Self {
             any_distance,
             dataset,
             summary,
+            kind,
             ..self
         }
     }
@@ -230,6 +235,7 @@ impl StudyEntry {
                 let (report, figure) = (S::report(store)?, S::figure(store)?);
                 Ok(Box::new(Summarised::<S> { report, figure }))
             }),
+            kind: Some(S::KIND),
         }
     }
 
@@ -283,6 +289,25 @@ impl StudyEntry {
         })?;
         plan(case, request, control)
     }
+}
+
+/// The summary of a finished dataset by the study that left it.
+///
+/// # Errors
+/// When no study leaves such a dataset, or a chunk is missing or damaged.
+pub fn summarised(store: &Store) -> Result<Box<dyn Answer>, Error> {
+    let kind = store.schema().attributes.get("kind");
+    let kind = kind.and_then(Value::as_str);
+    let entry = STUDIES
+        .iter()
+        .find(|study| kind.is_some() && study.kind == kind);
+    let summarise = entry.and_then(|study| study.summary).ok_or_else(|| {
+        Error::input(
+            format!("`{}` holds no dataset of a study", store.path().display()),
+            "give a dataset that nanotap computed",
+        )
+    })?;
+    summarise(store)
 }
 
 /// The study that is called `name`.

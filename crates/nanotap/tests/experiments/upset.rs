@@ -196,16 +196,11 @@ fn a_thin_basin_is_not_passed_over() {
         );
     }
     assert!(knocks.smaller_tried > 1000 && knocks.size_ratio < 1.05);
-}
-
-/// The smallest knock changes with the distance as the orbits do: by a few percent here.
-#[test]
-fn the_smallest_knock_changes_smoothly_with_the_distance() {
-    let [near, far] = [14.35, 14.5].map(|gap| {
-        let (_, orbit) = on_dmt(gap);
-        orbit.upset.unwrap().smallest.unwrap().tip_speed.abs()
-    });
-    assert!((near / far - 1.0).abs() < 0.1, "{near} {far}");
+    // It changes with the distance as the orbits do: by a few percent here.
+    let (_, farther) = on_dmt(14.5);
+    let farther = farther.upset.unwrap().smallest.unwrap().tip_speed.abs();
+    let change = found.tip_speed.abs() / farther - 1.0;
+    assert!(change.abs() < 0.05, "{change}");
 }
 
 /// A linear lever comes back from any knock, and so does a tapping one without another state.

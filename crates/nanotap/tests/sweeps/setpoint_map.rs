@@ -122,7 +122,7 @@ fn the_states_are_those_of_each_case_alone() {
 /// Neither the number of threads nor the order of the parameters or the values between changes a point.
 #[test]
 fn a_point_does_not_depend_on_the_grid() {
-    let case = lever(&[]);
+    let case = lever(&["modes=1"]);
     let map = window(&case, OVER, None, 1);
     let swapped = window(&case, [OVER[1], "sample.modulus=2GPa,20GPa,70GPa"], None, 2);
     for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -134,13 +134,13 @@ fn a_point_does_not_depend_on_the_grid() {
 #[test]
 fn stiffness_and_forces_may_be_doubled() {
     let single = window(
-        &lever(&[]),
+        &lever(&["modes=1"]),
         ["sample.modulus=5GPa,70GPa", "sample.hamaker=6.4e-20,1e-19"],
         None,
         2,
     );
     let double = window(
-        &lever(&["cantilever.k=80 N/m", "tip.modulus=340 GPa"]),
+        &lever(&["modes=1", "cantilever.k=80 N/m", "tip.modulus=340 GPa"]),
         [
             "sample.modulus=10GPa,140GPa",
             "sample.hamaker=1.28e-19,2e-19",

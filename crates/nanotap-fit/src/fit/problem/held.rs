@@ -232,15 +232,15 @@ impl Loop {
             let Stepped { orbit, breaks } = walk.step(gap, &Control::default()).ok()?;
             branch += breaks.len();
             last = Some((rest, gap, orbit.driven()));
-            Self::seen(problem, &case, &of_row, orbit, branch)
+            Self::row_point(problem, &case, &of_row, orbit, branch)
         };
         let rows = problem.data.curves[curve].rows.iter();
-        rows.map(|of| row(of).unwrap_or_else(|| RowPoint::nothing(columns)))
+        rows.map(|of| row(of).unwrap_or_else(|| RowPoint::empty(columns)))
             .collect()
     }
 
     /// The result at a row.
-    fn seen(
+    fn row_point(
         problem: &Problem<'_>,
         case: &Case,
         free: &Arc<Free>,
@@ -261,7 +261,7 @@ impl Loop {
                 case: case.clone(),
                 free: Arc::clone(free),
             })),
-            ..RowPoint::nothing(0)
+            ..RowPoint::empty(0)
         })
     }
 
@@ -288,7 +288,7 @@ impl Loop {
                 let case = problem.case_at(&bases[curve], &at);
                 let held = self.at(problem, x, &at, &case)?;
                 let orbit = held.close(&case, &guess).ok()?;
-                Self::seen(problem, &case, frees[index].as_ref()?, orbit, point.branch)
+                Self::row_point(problem, &case, frees[index].as_ref()?, orbit, point.branch)
             };
             follow().unwrap_or_else(|| point.without_orbit())
         };

@@ -80,7 +80,7 @@ pub(super) struct RowPoint {
 
 impl RowPoint {
     /// A row without an orbit.
-    pub(super) fn nothing(columns: usize) -> Self {
+    pub(super) fn empty(columns: usize) -> Self {
         Self {
             orbit: None,
             lost: true,
@@ -264,7 +264,7 @@ impl Problem<'_> {
     }
 
     /// The result for an orbit at a row.
-    fn seen(
+    fn row_point(
         &self,
         at: Arc<(Case, Model)>,
         branch: usize,
@@ -287,7 +287,7 @@ impl Problem<'_> {
             branch,
             observables: Some(Box::new(observables)),
             at: Some(at),
-            ..RowPoint::nothing(0)
+            ..RowPoint::empty(0)
         })
     }
 
@@ -302,7 +302,7 @@ impl Problem<'_> {
         self.finished(())?;
         let case = self.case_at(&self.cases(x)[curve], at);
         let model = case.model().ok()?;
-        let seen = self.seen(
+        let seen = self.row_point(
             Arc::new((case, model)),
             candidate.branch,
             candidate.orbit.clone(),
@@ -619,7 +619,7 @@ impl Problem<'_> {
                 });
                 let one = |candidate: &Candidate| {
                     let at = Arc::clone(at.as_ref()?);
-                    self.seen(at, candidate.branch, candidate.orbit.clone())
+                    self.row_point(at, candidate.branch, candidate.orbit.clone())
                 };
                 rows[row].iter().map(one).collect()
             })
@@ -666,7 +666,7 @@ impl Problem<'_> {
         }
         let pick = |(row, chosen): (usize, Option<usize>)| {
             let found = chosen.and_then(|k| seen[row][k].clone());
-            found.unwrap_or_else(|| RowPoint::nothing(self.data.columns.len()))
+            found.unwrap_or_else(|| RowPoint::empty(self.data.columns.len()))
         };
         Point {
             rows: chosen.into_iter().enumerate().map(pick).collect(),
@@ -768,7 +768,7 @@ impl LeastSquares for Problem<'_> {
                 }
                 let model = case.model().ok()?;
                 let orbit = newton_continuation(&mut ModelMap::new(&model), &guess)?;
-                self.seen(Arc::new((case, model)), before_point.branch, orbit)
+                self.row_point(Arc::new((case, model)), before_point.branch, orbit)
             };
             follow().unwrap_or_else(lost)
         };

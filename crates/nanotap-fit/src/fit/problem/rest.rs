@@ -157,7 +157,7 @@ impl Problem<'_> {
             branch,
             values: columns.map(|c| reading(&rest, c.quantity.rest())).collect(),
             rest: Some(rest),
-            ..RowPoint::nothing(0)
+            ..RowPoint::empty(0)
         }
     }
 

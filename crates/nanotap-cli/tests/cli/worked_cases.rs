@@ -109,7 +109,7 @@ pub(crate) fn follow_in(folder: &Folder, name: &str) -> (usize, usize) {
                 .clone()
                 .take_while(|line| !line.starts_with("$ nanotap "));
             // What it prints is all that is compared.
-            if shown.is_empty() || until_next.filter_map(compared).next().is_some() {
+            if shown.is_empty() || until_next.into_iter().find_map(compared).is_some() {
                 if !arguments.iter().any(|a| a == "--json") {
                     arguments.push("--json".into());
                 }
@@ -120,7 +120,7 @@ pub(crate) fn follow_in(folder: &Folder, name: &str) -> (usize, usize) {
             commands += 1;
             // Figures that the document mentions are drawn.
             if let Some(k) = arguments.iter().position(|a| *a == "--plot") {
-                assert!(folder.path().join(arguments[k + 1]).exists(), "{last}");
+                assert!(folder.path().join(&arguments[k + 1]).exists(), "{last}");
             }
         }
         if let Some((pointer, value, within)) = compared(line) {

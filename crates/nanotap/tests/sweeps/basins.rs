@@ -1,7 +1,10 @@
 //! Basins on slices.
 
+use std::path::Path;
+
 use nanotap::ErrorKind;
 use nanotap::case::Case;
+use nanotap::case::physical::Catalogue;
 use nanotap::case::units::Units;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::basin::figure;
@@ -221,7 +224,7 @@ fn invalid_slices_are_refused() {
             "0 starts",
         ),
         (
-            refused("a1=0:1:5", "v1=0:1:5", &|o| o.periods = 0),
+            refused("a1=0:1:5", "v1=0:1:5", &|o| o.periods = Some(0)),
             "0 periods",
         ),
         (
@@ -298,4 +301,25 @@ fn points_behind_the_surface_are_labelled_so() {
         (0.0, 0.0, 0.0)
     );
     assert!(figure(&store).is_ok());
+}
+
+/// Disturbances of a lever with Q = 400 die in thousands of periods: after 1000 most points are open.
+#[test]
+fn a_slow_lever_is_followed_until_it_settles() {
+    let file = Path::new("../../docs/cases/bistable-lever.toml");
+    let words = ["modes=1", "cantilever.Q=400"].map(str::to_owned);
+    let lever = Case::load(Some(file), &words, &Catalogue::shared()).unwrap();
+    let unsettled = |periods: Option<usize>| {
+        let options = BasinOptions {
+            periods,
+            ..BasinOptions::over("a1=-15nm:15nm:6", "v1=-0.03:0.03:6")
+        };
+        let folder = Folder::new();
+        let store = computed(&lever, &options, &folder.join("slow"), 2);
+        let found = shares(&store).unwrap();
+        assert_eq!(found.attractors.len(), 2);
+        found.unsettled
+    };
+    assert!(unsettled(Some(1000)) > 0.5);
+    assert_eq!(unsettled(None), 0.0);
 }

@@ -1017,7 +1017,7 @@ def basin(
     attractors: Iterable[Any] | None = None,
     starts: int = 64,
     seed: int = 1,
-    periods: int = 1000,
+    periods: int | None = None,
     max_period: int = 64,
     out: Path | None = None,
     chunk: str = "1/1",
@@ -1046,8 +1046,9 @@ def basin(
         Initial states of the census (1 to 1000000).
     seed : int
         Seed of the census.
-    periods : int
-        Drive periods after which a point counts as unsettled (1 to 100000000).
+    periods : int | None
+        Drive periods after which a point counts as unsettled; default: enough for
+        the orbit whose disturbances die slowest, 1000 at least (1 to 100000000).
     max_period : int
         Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None

@@ -37,9 +37,9 @@ pub fn scan_figure(report: &ScanReport) -> Figure {
     figure.caption(&report.verdict)
 }
 
-/// Axis of the position, and the factor of positions.
+/// Axis of the position, and the factor of positions: in the unit in which the middle of a line is shown.
 fn along(report: &ScanReport) -> (Axis, f64) {
-    si_axis("position $x$", Kind::Length, report.size[0])
+    si_axis("position $x$", Kind::Length, 0.5 * report.size[0])
 }
 
 fn line_figure(report: &ScanReport) -> Figure {

@@ -9,7 +9,12 @@ use crate::noise::NoiseReport;
 /// Root of a density in SI against the frequency, on logarithmic axes.
 fn panel(frequency: &str, of: &[f64], label: &str, kind: Kind, density: &[f64]) -> Panel {
     let roots: Vec<f64> = density.iter().map(|density| density.sqrt()).collect();
-    let (x, along) = si_axis(frequency, Kind::Frequency, largest_of(of.iter().copied()));
+    // The middle of a logarithmic axis.
+    let middle = match of {
+        [low, .., high] => (low * high).sqrt(),
+        _ => largest_of(of.iter().copied()),
+    };
+    let (x, along) = si_axis(frequency, Kind::Frequency, middle);
     let (y, factor) = si_axis(label, kind, largest_of(roots.iter().copied()));
     let [x, y] = [x, y].map(|axis| Axis {
         scale: Scale::Log,

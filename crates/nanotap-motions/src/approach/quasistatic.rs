@@ -133,7 +133,7 @@ pub(super) fn followed_curve(
         None => written.table(control)?,
     };
     let coexisting = match curve.speed {
-        None => written.coexisting(&table)?,
+        None => written.coexisting(&table, control)?,
         Some(_) => Vec::new(),
     };
     let not_measured = sweep.spent_budget().map(Written::not_measured);
@@ -248,6 +248,9 @@ impl Written<'_> {
         // Which rows fail at the end of the budget depends on threads: all that are measured
         // together are then undecided.
         for distances in self.distances.chunks(ROWS_AT_ONCE) {
+            if control.is_cancelled() {
+                break;
+            }
             let measured = self.rows(distances, &done, control)?;
             match self.sweep.spent_budget() {
                 None => rows.extend(measured),
@@ -327,8 +330,12 @@ impl Written<'_> {
             .collect()
     }
 
-    /// Orbits of stretches on which neither way is at a distance.
-    fn coexisting(&self, table: &[ApproachPoint]) -> Result<Vec<ApproachPoint>, CaseError> {
+    /// Orbits of stretches on which neither way is at a distance; none where the work was stopped.
+    fn coexisting(
+        &self,
+        table: &[ApproachPoint],
+        control: &Control<'_>,
+    ) -> Result<Vec<ApproachPoint>, CaseError> {
         let rows: Result<Vec<Vec<_>>, CaseError> = self
             .distances
             .par_iter()
@@ -341,6 +348,9 @@ impl Written<'_> {
                         let is_on = |p: &Piece| matches!(p.motion, Motion::Periodic(s) if s == k);
                         pieces.iter().any(|p| p.holds(gap) && is_on(p))
                     };
+                    if control.is_cancelled() {
+                        break;
+                    }
                     if !stretch.holds(gap) || self.ways.each().iter().any(|(_, w)| used(w)) {
                         continue;
                     }
@@ -358,8 +368,8 @@ impl Written<'_> {
             })
             .collect();
         let rows = rows?.into_iter().flatten();
-        // What was found before the budget was spent depends on threads.
-        let complete = self.sweep.spent_budget().is_none();
+        // What was found before the budget was spent, or the work was stopped, depends on threads.
+        let complete = self.sweep.spent_budget().is_none() && !control.is_cancelled();
         Ok(rows.filter(|_| complete).collect())
     }
 

@@ -7,7 +7,22 @@ from typing import Any
 import nanotap
 import numpy as np
 import pytest
-from browsers import CHROMIUM, FLAGS, address_of, limited, started
+from browsers import CHROMIUM, FLAGS, WAIT, address_of, limited, started
+
+# Files that take minutes, the longest first.
+LONG = ["test_page_states", "test_explorer", "test_page_plan", "test_page_numbers"]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begins with the long files, so that two workers end at about the same time."""
+
+    def place(item: pytest.Item) -> int:
+        name = item.path.stem
+        if name in LONG:
+            return LONG.index(name)
+        return len(LONG) + (not name.startswith("test_page"))
+
+    items.sort(key=place)
 
 
 @pytest.fixture(scope="session")
@@ -97,7 +112,7 @@ def browser(playwright: Any) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def page(address: str, browser: Any) -> Any:
     page = browser.new_page(viewport={"width": 1440, "height": 1000})
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(1000 * WAIT)
     page.complaints = []
     page.asked = []
     page.on(
@@ -107,7 +122,6 @@ def page(address: str, browser: Any) -> Any:
     page.on("pageerror", lambda error: page.complaints.append(str(error)))
     page.on("request", lambda request: page.asked.append(request.url))
     with limited():
-        # The first page of a browser takes long on a busy machine.
-        page.goto(f"{address}#view=studies", timeout=60_000)
+        page.goto(f"{address}#view=studies")
         page.wait_for_selector("td[data-observable=amplitude]")
     return page

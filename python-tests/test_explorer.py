@@ -27,7 +27,7 @@ import numpy as np
 import psutil
 import pytest
 from browsers import (
-    LIMIT,
+    WAIT,
     address_of,
     asked,
     case_file,
@@ -312,7 +312,7 @@ def test_a_client_that_goes_away_stops_its_work_and_holds_up_nobody(
         "tab": "resonance",
         "options": {"key": "omega", "from": "2.9", "to": "3.1"},
     }
-    lines = asked(address, "/api/study", wanted, limit=LIMIT).splitlines()
+    lines = asked(address, "/api/study", wanted).splitlines()
     words = [json.loads(text)["words"] for text in lines]
     assert words[-1].startswith("120 values and")
 
@@ -504,9 +504,10 @@ def test_half_a_request_is_not_waited_for(address: str) -> None:
         client.close()
 
 
+@pytest.mark.alone
 def test_newer_motions_are_not_held_up_by_slow_ones(address: str) -> None:
-    # Chaos in ten modes: many seconds each.
-    slow = {"case": {"preset": "paper-chaos", "set": ["modes=10"]}}
+    # Chaos in twenty modes: two seconds each.
+    slow = {"case": {"preset": "paper-chaos", "set": ["modes=20"]}}
     base, token = address.split("/?token=")
     headers = {"x-nanotap-token": token, "content-type": "application/json"}
     clients = []
@@ -517,8 +518,9 @@ def test_newer_motions_are_not_held_up_by_slow_ones(address: str) -> None:
     # Until the server has read them all: one that it reads later is newer.
     time.sleep(2)
     assert motion(address)["summary"].startswith("period")
-    refused = clients[0].getresponse()
-    assert "newer motions" in json.loads(refused.read())["error"]
+    # The first ones may have been answered before there were newer ones.
+    answers = [json.loads(client.getresponse().read()) for client in clients[:10]]
+    assert any("newer motions" in one.get("error", "") for one in answers)
     for client in clients:
         client.close()
 
@@ -575,8 +577,6 @@ def changes(page: Any, before: float) -> None:
 
 def inked(page: Any, name: str) -> float:
     """The part of a figure's pixels that are drawn."""
-    page.locator(f"#{name}").scroll_into_view_if_needed()
-    page.wait_for_timeout(200)
     return float(
         page.evaluate(
             """(name) => {
@@ -591,19 +591,24 @@ def inked(page: Any, name: str) -> float:
     )
 
 
+def draws(page: Any, name: str) -> None:
+    """A figure that is in view is painted with the browser's next frame."""
+    page.locator(f"#{name}").scroll_into_view_if_needed()
+    until(page, lambda: inked(page, name) > 0.01)
+
+
 def test_every_panel_shows_something(page: Any, address: str) -> None:
     opened(page, address, "preset=paper")
     # Deflection, portrait, harmonics, multipliers; height, force, force against height.
     assert len(page.evaluate("document.getElementById('portrait').panels")) == 4
     assert len(page.evaluate("document.getElementById('contact').panels")) == 3
-    assert inked(page, "portrait") > 0.01
+    draws(page, "portrait")
     label = page.get_attribute("#contact canvas", "aria-label")
     assert label.startswith("height over the sample")
     assert page.locator("#knobs input[data-key]").count() >= 8
     drawn = "import('/lever.js').then((m) => m.frames.drawn)"
     before = page.evaluate(drawn)
-    page.wait_for_timeout(700)
-    assert page.evaluate(drawn) > before
+    until(page, lambda: page.evaluate(drawn) > before)
 
 
 def test_its_numbers_are_the_servers(page: Any, address: str) -> None:
@@ -656,7 +661,7 @@ def test_the_census_lists_what_coexists_and_a_click_shows_it(
 ) -> None:
     opened(page, address, "preset=paper-fast")
     # Ω = 20 without a tip mass: period 1 and period 4 (the paper's Figs. 15 and 17).
-    page.wait_for_selector("#attractors button >> nth=1", timeout=60_000)
+    page.wait_for_selector("#attractors button >> nth=1")
     words = " ".join(page.locator("#attractors button").all_inner_texts())
     assert sorted(re.findall(r"period (\d+)", words)) == ["1", "4"]
     page.click("#attractors button:has-text('period 4')")
@@ -688,15 +693,14 @@ def test_a_dragged_slider_moves_the_numbers_on_the_way(page: Any, address: str) 
     x, y = middle(page, "[data-slider=omega]")
     page.mouse.move(x, y)
     page.mouse.down()
-    met = set()
+    met = {observed(page, "amplitude")}
     for k in range(1, 6):
-        page.mouse.move(x + k, y)
-        idle(page)
+        page.mouse.move(x + 2 * k, y)
+        until(page, lambda: observed(page, "amplitude") not in met)
         met.add(observed(page, "amplitude"))
     assert "set.omega" not in page.url
     page.mouse.up()
     until(page, lambda: "set.omega=" in page.url)
-    assert len(met) >= 3
 
 
 def test_an_emptied_knob_takes_its_key_away(page: Any, address: str) -> None:
@@ -782,7 +786,7 @@ def test_a_click_on_a_drawn_motion_shows_that_motion(
     fields = "".join(f"&study.{name}={text}" for name, text in options.items())
     opened(page, address, f"preset=paper&tab={tab}{fields}")
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     # A motion in the middle of the figure, from the server's list.
     study = first_stage(address, tab=tab, options={"key": "omega", **options})
@@ -813,7 +817,7 @@ def test_a_click_meets_the_motion_that_a_run_from_rest_does_not(
     period = page.inner_text("#summary").split("period ")[1][0]
     other = {"1": 4, "4": 1}[period] if period in "14" else 4
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     study = first_stage(
         address, case={"preset": "paper-fast"}, tab="branches", options=options
@@ -835,7 +839,7 @@ def test_a_click_meets_the_motion_that_a_run_from_rest_does_not(
 
 def test_a_click_on_a_basin_starts_a_run_there(page: Any, address: str) -> None:
     opened(page, address, "preset=paper&tab=basin&ran=yes")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     page.mouse.click(*spot(page, "study-figure", 0, 0.6, 0.5))
     until(page, lambda: "start=" in page.url)
@@ -855,7 +859,7 @@ def test_a_map_of_two_parameters_and_a_click_on_it(
     ranges = "study.from1=18&study.to1=22&study.from2=3.0&study.to2=3.1"
     words = shows.replace(" ", "+")
     opened(page, address, f"preset=paper&tab=map&ran=yes&{ranges}&study.show={words}")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     said = page.locator("#study-figure [aria-label]").evaluate_all(
         "(all) => all.map((one) => one.getAttribute('aria-label')).join(' ')"
@@ -877,14 +881,14 @@ def test_a_map_of_two_parameters_and_a_click_on_it(
 def test_a_link_computes_its_study_again(page: Any, address: str) -> None:
     link = "preset=paper&tab=approach&ran=yes&study.to=0&view.study.0=1,2,0,3"
     opened(page, address, link)
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     panel = panels(page, "study-figure")[0]
     assert (panel["x"]["from"], panel["x"]["to"]) == (1, 2)
 
 
 def test_a_motion_is_followed_as_knobs_turn(page: Any, address: str) -> None:
     opened(page, address, "preset=paper-fast&follow=yes")
-    page.wait_for_selector("#attractors button >> nth=1", timeout=60_000)
+    page.wait_for_selector("#attractors button >> nth=1")
     page.click("#attractors button:has-text('period 4')")
     until(page, lambda: "period 4" in page.inner_text("#summary"))
     page.fill("[data-key=omega]", "20.01")
@@ -1134,11 +1138,11 @@ def test_a_slider_shows_what_the_server_used(
 def test_a_figure_of_other_values_says_so(page: Any, address: str) -> None:
     opened(page, address, "preset=paper&tab=resonance&study.from=2.9&study.to=3.1")
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     assert page.is_hidden("#stale")
     assert "ran=yes" in page.url
-    page.wait_for_selector("#attractors button", timeout=60_000)
+    page.wait_for_selector("#attractors button")
     typed(page, "alpha4", "19")
     until(page, lambda: page.is_visible("#stale"))
     assert "computed for other values" in page.inner_text("#stale")
@@ -1176,7 +1180,7 @@ def test_a_late_census_of_another_case_is_dropped(page: Any, address: str) -> No
     typed(page, "omega", "3")
     until(page, lambda: "set.omega=3" in page.url)
     # Its search has ended, and another one finds what there is.
-    page.wait_for_selector("#attractors button", timeout=60_000)
+    page.wait_for_selector("#attractors button")
     assert page.locator("#attractors button").count() == 1
 
 
@@ -1203,7 +1207,7 @@ def test_a_click_at_a_setpoint_gives_the_clicked_motion(
     fields = "&study.from=329+kHz&study.to=332+kHz"
     opened(page, address, f"preset=stiff-lever&set.modes=1&tab=resonance{fields}")
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     study = first_stage(address, case=case, tab="resonance", options=options)
     near = study["clicks"]["near"]
@@ -1221,7 +1225,7 @@ def test_a_click_on_a_levers_basin_starts_where_it_says(
     page: Any, address: str
 ) -> None:
     opened(page, address, "preset=dmt&tab=basin&ran=yes")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
     x = panels(page, "study-figure")[0]["x"]
     page.mouse.click(*spot(page, "study-figure", 0, 0.6, 0.5))
@@ -1237,7 +1241,7 @@ def test_a_plan_outlines_where_its_conditions_hold(page: Any, address: str) -> N
     ranges = "&study.from1=28+nm&study.to1=32+nm&study.from2=0.6&study.to2=0.7"
     opened(page, address, f"preset=dmt&tab=plan&study.force=4+nN{ranges}")
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     words = page.inner_text("#progress")
     stopped(page)
     # A large amplitude leaves one motion, in repulsion, at a peak force between 3 and 4 nN.
@@ -1257,7 +1261,7 @@ def test_the_approach_curve_is_drawn_at_once_with_the_motion_on_it(
     page: Any, address: str
 ) -> None:
     opened(page, address, "preset=dmt")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     assert page.get_attribute("#tab-approach", "aria-selected") == "true"
     # The line is at the present distance, 18 nm.
     panel = panels(page, "study-figure")[0]
@@ -1282,7 +1286,7 @@ def test_the_motions_of_a_lever_are_listed_by_themselves(
 ) -> None:
     opened(page, address, "preset=dmt")
     assert read(page, "regime") == "repulsive"
-    page.wait_for_selector("#attractors button >> nth=1", timeout=60_000)
+    page.wait_for_selector("#attractors button >> nth=1")
     # The case's own file says that an attractive and a repulsive oscillation coexist.
     assert page.locator("#attractors button").count() == 2
     assert "2 stable motions coexist here" in page.inner_text("#states-here")
@@ -1316,7 +1320,7 @@ def test_a_pinned_curve_stays_behind_the_next(page: Any, address: str) -> None:
         return str(page.get_attribute("#study-figure canvas", "aria-label"))
 
     opened(page, address, "preset=dmt")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     first = panels(page, "study-figure")[0]["y"]["to"]
     assert "pinned" not in legend()
     page.click("#pin")
@@ -1374,7 +1378,7 @@ def test_a_guided_start_shows_what_it_says(page: Any, address: str, name: str) -
     assert page.locator("#lessons a").all_inner_texts() == LESSONS
     page.click(f"#lessons a:has-text('{name}')")
     until(page, lambda: "lesson=" in page.url)
-    for _ in range(400):
+    for _ in range(10 * WAIT):
         if page.locator("#study-figure:not(.stale) canvas").count():
             break
         page.wait_for_timeout(100)
@@ -1415,9 +1419,9 @@ def computed(page: Any, tab: str) -> None:
     page.click(f"#tab-{tab}")
     idle(page)
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     stopped(page)
-    assert inked(page, "study-figure") > 0.01
+    draws(page, "study-figure")
 
 
 def test_the_tour_of_two_motions(page: Any, address: str, tmp_path: Path) -> None:
@@ -1426,7 +1430,7 @@ def test_the_tour_of_two_motions(page: Any, address: str, tmp_path: Path) -> Non
     page.select_option("#preset", "paper-fast")
     until(page, lambda: "period" in page.inner_text("#summary"))
     assert "No tip mass at Ω = 20" in page.inner_text("#summary")
-    page.wait_for_selector("#attractors button >> nth=1", timeout=60_000)
+    page.wait_for_selector("#attractors button >> nth=1")
     assert "elsewhere" in page.inner_text("#bound")
     before = {name: observed(page, name) for name in ("amplitude", "peak_force")}
     page.click("#attractors button[aria-pressed=false]")
@@ -1491,7 +1495,7 @@ def test_a_surface_is_drawn_and_the_tip_follows_it(page: Any, address: str) -> N
     assert len(heights) == 64 and float(heights[0]) == 0
     assert float(heights[30]) == pytest.approx(0.8, abs=0.03)
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     surface = "document.getElementById('study-figure').figure.panels[0].layers"
     lines = [one for one in page.evaluate(surface) if one["kind"] == "line"]
     drawn, trace = (
@@ -1503,10 +1507,12 @@ def test_a_surface_is_drawn_and_the_tip_follows_it(page: Any, address: str) -> N
     # The tip goes along the line.
     at = "document.getElementById('study-figure').now?.[0]?.x ?? -1"
     met = set()
-    for _ in range(20):
+
+    def moves() -> bool:
         met.add(page.evaluate(at))
-        page.wait_for_timeout(50)
-    assert len(met) > 5
+        return len(met) > 5
+
+    until(page, moves)
     # A slower scan, by its slider.
     before = page.input_value("#study-form [name=rate]")
     page.focus("#study-form [name=rate] + input")
@@ -1539,7 +1545,7 @@ def cells(page: Any, row: Any) -> list[str]:
 def test_levers_are_compared_and_a_click_takes_one(page: Any, address: str) -> None:
     opened(page, address, "preset=dmt&tab=levers&study.regime=any")
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#tables .choice", timeout=60_000)
+    page.wait_for_selector("#tables .choice")
     idle(page)
     heads = page.locator("#tables thead th").all_inner_texts()
     rows = [cells(page, row) for row in page.locator("#tables .choice").all()]
@@ -1590,13 +1596,14 @@ def test_a_study_of_the_registry_is_computed_on_the_page(
     page.click("#tab-modes")
     page.wait_for_selector("#study-form button[type=submit]")
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#tables tbody tr", timeout=60_000)
-    assert inked(page, "study-figure") > 0.01
+    page.wait_for_selector("#tables tbody tr")
+    draws(page, "study-figure")
     opened(page, address, page.url.split("#")[1])
     assert page.get_attribute("#tab-modes", "aria-selected") == "true"
-    page.wait_for_selector("#tables tbody tr", timeout=60_000)
+    page.wait_for_selector("#tables tbody tr")
 
 
+@pytest.mark.alone
 def test_a_trial_tells_how_long_a_study_takes(address: str) -> None:
     def told(points: int) -> tuple[float, str]:
         over = f"omega=2.9:3.1:{points},alpha4=18:22:20"
@@ -1640,15 +1647,15 @@ def test_a_long_study_says_so_before_it_begins(page: Any, address: str) -> None:
 
 def test_a_dataset_is_shown_and_its_folder_removed(page: Any, tmp_path: Path) -> None:
     own = page.context.browser.new_page()
-    own.set_default_timeout(30_000)
+    own.set_default_timeout(1000 * WAIT)
     with started(TMPDIR=str(tmp_path)) as server:
         address = address_of(server)
         opened(own, address, "preset=paper&tab=sweep&study.over=omega=2.9,3,3.1")
         assert own.get_attribute("#tab-sweep", "aria-selected") == "true"
         own.click("#study-form button[type=submit]")
-        own.wait_for_selector("#tables tbody tr", timeout=60_000)
+        own.wait_for_selector("#tables tbody tr")
         idle(own)
-        assert inked(own, "study-figure") > 0.01
+        draws(own, "study-figure")
         assert "period 1" in own.inner_text("#tables") or "periodic" in own.inner_text(
             "#tables"
         )
@@ -1672,7 +1679,7 @@ def test_a_force_without_a_law_is_reconstructed(
     page.set_input_files("#study-form input[type=file]", CURVE)
     until(page, lambda: "rows" in page.inner_text("#progress"))
     page.click("#reconstruct")
-    page.wait_for_selector("#tables button", timeout=90_000)
+    page.wait_for_selector("#tables button")
     command = page.text_content("#study-command").split()
     assert command[:4] == ["nanotap", "reconstruct", CURVE.name, "case.toml"]
     # The terminal gives the same: its numbers are those drawn, and those in words.
@@ -1725,7 +1732,7 @@ def test_a_measured_curve_is_shown_over_the_model_and_fitted(
     page.click("#study-form summary")
     page.fill("#study-form [name=starts]", "1")
     page.click("#fit")
-    page.wait_for_selector("#tables button", timeout=90_000)
+    page.wait_for_selector("#tables button")
     rows = [cells(page, row) for row in page.locator("#tables tbody tr").all()]
     modulus = next(row for row in rows if row[0] == "sample.modulus")
     assert float(modulus[1].split()[0]) == pytest.approx(4, rel=0.05)
@@ -1778,6 +1785,7 @@ def test_measured_data_are_bounded_and_refused_in_words(address: str) -> None:
     assert refused.value.code == 413
 
 
+@pytest.mark.alone
 def test_changed_requests_leave_no_work_and_no_memory(address: str) -> None:
     """Requests with numbers and words changed at random; their clients leave at once."""
     with started() as server:
@@ -1822,7 +1830,7 @@ def test_changed_requests_leave_no_work_and_no_memory(address: str) -> None:
 
 def test_an_ended_server_says_so(page: Any) -> None:
     other = page.context.browser.new_page()
-    other.set_default_timeout(30_000)
+    other.set_default_timeout(1000 * WAIT)
     with started() as server:
         other.goto(address_of(server))
         other.wait_for_selector("#rows tbody tr")

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+pytestmark = pytest.mark.alone
+
 CASES = pathlib.Path(__file__).parents[1] / "docs" / "cases"
 # Seconds until the signal, and from then to the exception. On a loaded machine the processor time counts,
 # which is longer than the time wherever the work goes on.

@@ -15,7 +15,7 @@ from typing import Any
 import nanotap
 import numpy as np
 import pytest
-from browsers import idle, limited, observed, until
+from browsers import WAIT, idle, limited, observed, until
 from program import ROOT
 
 FOLDER = Path(os.environ.get("NANOTAP_PAGE", ROOT / "target" / "page"))
@@ -89,7 +89,7 @@ def site(folder: Path) -> Iterator[str]:
 
 @pytest.fixture(autouse=True)
 def _limit() -> Iterator[None]:
-    with limited(200):
+    with limited():
         yield
 
 
@@ -100,7 +100,7 @@ def page(browser: Any) -> Iterator[Any]:
     """
     context = browser.new_context(viewport={"width": 1440, "height": 1000})
     page = context.new_page()
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(1000 * WAIT)
     complaints: list[str] = []
     loaded: list[str] = []
     page.on(
@@ -221,7 +221,7 @@ def test_a_link_to_an_opened_case_opens_it_anywhere(
     single = f"{(folder / 'nanotap.html').as_uri()}#{link.split('#')[1]}"
     for address in (link, single):
         other = page.context.new_page()
-        other.set_default_timeout(60_000)
+        other.set_default_timeout(1000 * WAIT)
         opened(other, address)
         assert (observed(other, "amplitude"), other.inner_text("#summary")) == numbers
         assert other.get_attribute("#tab-basin", "aria-selected") == "true"

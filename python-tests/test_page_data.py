@@ -19,7 +19,7 @@ def opened(page: Any, address: str, path: Path) -> None:
     page.goto("about:blank")
     page.goto(f"{address}#view=data&preset=dmt&set.drive.setpoint=0.8")
     page.set_input_files("#study-form input[type=file]", path)
-    page.wait_for_selector("#tables tbody tr", timeout=60_000)
+    page.wait_for_selector("#tables tbody tr")
 
 
 def estimates(page: Any) -> dict[str, list[float]]:

@@ -85,14 +85,14 @@ def opened(page: Any, address: str, folder: Path, language: str = "en") -> None:
     until(page, lambda: "case=" in page.url)
     until(page, lambda: page.locator("#study-form input[type=file]").count() == 1)
     page.set_input_files("#study-form input[type=file]", folder / "image.gwy")
-    page.wait_for_selector("#study-form [name=phase_offset]", timeout=60_000)
+    page.wait_for_selector("#study-form [name=phase_offset]")
 
 
 def decided(page: Any) -> None:
     page.fill("#study-form [name=phase_offset]", "0")
     page.select_option("#study-form [name=sense]", "lag")
     page.click("#image-again")
-    page.wait_for_selector("#image-files", timeout=60_000)
+    page.wait_for_selector("#image-files")
     until(page, lambda: "Shares of the pixels" in page.inner_text("#progress"))
 
 
@@ -182,7 +182,7 @@ def test_an_image_whose_offset_is_not_known_says_so_in_both_languages(
 ) -> None:
     for language, words in (("en", "does not tell"), ("de", "verrät nicht")):
         opened(page, address, folder, language)
-        page.wait_for_selector("#image-shares", timeout=60_000)
+        page.wait_for_selector("#image-shares")
         found = printed(folder, "image-states", "image.gwy", "case.toml")
         assert (words in page.inner_text("#progress")) == (not found["decided"])
         figure = page.evaluate(

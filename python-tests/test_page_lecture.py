@@ -6,12 +6,13 @@ import base64
 import json
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from browsers import asked, case_file, printed
+from browsers import WAIT, asked, case_file, printed
+from test_page_states import until
 
 LETTERS = 28  # CSS pixels of the smallest letters on a projector
 
@@ -19,20 +20,12 @@ LETTERS = 28  # CSS pixels of the smallest letters on a projector
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
     page = browser.new_page(viewport={"width": 1280, "height": 720}, locale="en")
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(1000 * WAIT)
     complaints: list[str] = []
     page.on("pageerror", lambda error: complaints.append(str(error)))
     yield page
     page.close()
     assert not complaints
-
-
-def until(page: Any, condition: Callable[[], bool]) -> None:
-    for _ in range(600):
-        if condition():
-            return
-        page.wait_for_timeout(100)
-    raise AssertionError("nothing changed in 60 s")
 
 
 def answers(page: Any) -> list[str]:
@@ -215,7 +208,7 @@ def test_a_phone_opens_the_step_and_shows_its_letter(
     phone = browser.new_page(
         viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
     )
-    phone.set_default_timeout(60_000)
+    phone.set_default_timeout(1000 * WAIT)
     phone.goto(f"{address}#lesson=phase.2")
     known(phone)
     assert phone.inner_text("#show-place") == "2 of 4"

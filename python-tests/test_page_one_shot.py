@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from browsers import asked, case_file, limited, printed, studied
+from test_page_states import until
 
 CASE = {"preset": "bistable", "set": ["gap.tip=3nm"]}
 SIGNAL = "pulse 1us times 400"
@@ -18,7 +19,7 @@ FIRST = "Time of the first contact"
 
 @pytest.fixture(autouse=True)
 def _limit() -> Iterator[None]:
-    with limited(100):
+    with limited():
         yield
 
 
@@ -137,11 +138,7 @@ def test_a_long_run_is_stopped(page: Any, address: str) -> None:
     counted = (
         "() => / of 20000\\d\\d /.test(document.getElementById('progress').textContent)"
     )
-    for _ in range(300):
-        if page.evaluate(counted):
-            break
-        page.wait_for_timeout(100)
-    assert page.evaluate(counted), page.inner_text("#progress")
+    until(page, lambda: page.evaluate(counted))
     page.click("#stop")
     page.wait_for_selector("#stop", state="hidden", timeout=10_000)
     assert page.inner_text("#progress") == "stopped"

@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from browsers import limited
-from test_page_states import NUMBERS, solved
+from test_page_states import NUMBERS, solved, until
 
 CURVE = Path(__file__).parent.parent / "docs/cases/polystyrene-curve.csv"
 DMT = "preset=dmt&set.drive.setpoint=0.8"
@@ -21,21 +21,13 @@ DRAGGED = 30
 
 @pytest.fixture(autouse=True)
 def _limit() -> Iterator[None]:
-    with limited(300):
+    with limited():
         yield
 
 
 def opened(page: Any, address: str, fragment: str) -> None:
     page.goto("about:blank")
     page.goto(f"{address}#{fragment}")
-
-
-def until(page: Any, ready: Callable[[], bool]) -> None:
-    for _ in range(600):
-        if ready():
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError("not ready after 30 s")
 
 
 @contextlib.contextmanager
@@ -106,7 +98,7 @@ def test_the_plan_says_how_far_it_is(page: Any, address: str) -> None:
         assert words(page, "#plan-head").startswith("Looking near")
         assert page.is_hidden("#plan-map")
     # Partial: an answer, so far.
-    page.wait_for_selector("#plan-line", timeout=60_000)
+    page.wait_for_selector("#plan-line")
     assert words(page, "#plan-far").startswith("So far:")
     # Refused by the page, with what would be accepted.
     page.fill("#plan-force", "much")
@@ -136,14 +128,14 @@ def test_the_scan_says_what_it_shows(page: Any, address: str) -> None:
         until(page, lambda: "computing the line" in words(page, "#scan-state"))
     page.wait_for_selector("#strips[data-line=approximate]")
     assert words(page, "#scan-state").startswith("≈")
-    page.wait_for_selector("#strips[data-line=exact]", timeout=60_000)
+    page.wait_for_selector("#strips[data-line=exact]")
     # Stale: of the former value of a knob.
     with held(page, "/api/study"):
         page.fill("#scan-gain", "300")
         page.press("#scan-gain", "Enter")
         page.wait_for_selector("#strips[data-line=stale]")
         assert "of the former value: gain" in words(page, "#scan-state")
-    page.wait_for_selector("#strips[data-line=exact]", timeout=60_000)
+    page.wait_for_selector("#strips[data-line=exact]")
     # Refused.
     page.fill("#scan-height", "high")
     page.press("#scan-height", "Enter")
@@ -187,7 +179,7 @@ def test_my_data_say_what_is_wrong_with_a_file(
     page.set_input_files(file, CURVE)
     until(page, lambda: "100 rows" in words(page, "#progress"))
     page.click("#reconstruct")
-    page.wait_for_selector("#tables button", timeout=60_000)
+    page.wait_for_selector("#tables button")
     page.fill("#free", "21 nm")
     page.press("#free", "Enter")
     until(page, lambda: page.is_visible("#stale"))
@@ -203,7 +195,7 @@ def test_a_study_says_how_far_it_is(page: Any, address: str) -> None:
     assert page.is_hidden("#study-figure")
     # Partial.
     page.click("#study-form button[type=submit]")
-    page.wait_for_selector("#study-figure canvas", timeout=60_000)
+    page.wait_for_selector("#study-figure canvas")
     until(page, lambda: "values" in words(page, "#progress"))
     until(page, lambda: words(page, "#progress") == "2304 values")
     # Stale.
@@ -254,6 +246,7 @@ def test_a_late_answer_does_not_take_the_slider(page: Any, address: str) -> None
     assert all(high > low for high, low in itertools.pairwise(seen)), seen
 
 
+@pytest.mark.alone
 def test_a_slider_is_dragged_for_long(page: Any, address: str, tmp_path: Path) -> None:
     opened(page, address, "preset=dmt&set.modes=3&set.drive.setpoint=0.8")
     until(page, lambda: "A click sets" in words(page, "#curve-words"))

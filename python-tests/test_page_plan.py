@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsers import asked, case_file, limited, printed, studied
+from browsers import WAIT, Answers, asked, case_file, limited, printed
+from test_page_states import until
 
 WISHES = {"force": "1.6 nN", "want": "one", "points": "256", "step": "10 nm"}
 CASE = {"preset": "dmt", "set": ["drive.setpoint=0.8"]}
@@ -28,29 +29,34 @@ def settings(point: dict[str, Any]) -> list[str]:
     return [word for key, text in pairs for word in ("--set", f"drive.{key}={text}")]
 
 
-def planned(address: str, **wishes: str) -> list[dict[str, Any]]:
-    """What the program says of the map, stage by stage."""
-    options = {**WISHES, **wishes}
-    stages = studied(address, case=CASE, tab="wishes", options=options)
+@pytest.fixture(scope="module")
+def answers(address: str) -> Answers:
+    return Answers(address)
+
+
+def planned(answers: Answers, **wishes: str) -> list[dict[str, Any]]:
+    """What the program says of the map, stage by stage; the page gets the same if it asks the same."""
+    body = {"case": CASE, "tab": "wishes", "options": {**WISHES, **wishes}}
+    stages = [json.loads(line) for line in answers.to("/api/study", body).splitlines()]
     return [stage["clicks"]["plan"] for stage in stages if "clicks" in stage]
 
 
 @pytest.fixture(scope="module")
-def stages(address: str) -> list[dict[str, Any]]:
-    return planned(address)
+def stages(answers: Answers) -> list[dict[str, Any]]:
+    return planned(answers)
 
 
 @pytest.fixture(autouse=True)
 def _limit() -> Iterator[None]:
-    # A map of 153 points, and a table of all levers.
-    with limited(200):
+    with limited():
         yield
 
 
 @pytest.fixture(scope="module")
-def page(browser: Any) -> Any:
+def page(browser: Any, answers: Answers, stages: list[dict[str, Any]]) -> Any:
     page = browser.new_page(viewport={"width": 1440, "height": 900})
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(1000 * WAIT)
+    answers.given(page, "/api/study", only_known=True)
     page.complaints = []
     page.on("pageerror", lambda error: page.complaints.append(str(error)))
     return page
@@ -59,7 +65,7 @@ def page(browser: Any) -> Any:
 def view(page: Any, address: str, fragment: str = "") -> None:
     page.goto("about:blank")
     page.goto(f"{address}#preset=dmt&set.drive.setpoint=0.8&view=plan{fragment}")
-    page.wait_for_selector("#view-plan[data-plan=done]", timeout=90_000)
+    page.wait_for_selector("#view-plan[data-plan=done]")
     # The lists have their values once the case is known.
     page.wait_for_selector("#plan-lever option:nth-child(9)", state="attached")
 
@@ -180,8 +186,9 @@ def test_the_notebooks_line_is_of_the_offered_point(
 def test_a_wish_that_nothing_meets_has_its_nearest(
     page: Any,
     address: str,
+    answers: Answers,
 ) -> None:
-    plan = planned(address, force="0.2 nN", want="tap")[-1]
+    plan = planned(answers, force="0.2 nN", want="tap")[-1]
     assert plan["best"] == []
     fails = plan["fails"]
     tapping = [p for p in plan["points"] if p.get("force") and p["kind"]]
@@ -193,7 +200,7 @@ def test_a_wish_that_nothing_meets_has_its_nearest(
     assert least["force"]["shown"] in page.text_content("#plan-say")
     assert page.is_hidden("#plan-line")
     # Which lever would do: the best of the table comes first.
-    page.wait_for_selector("#plan-levers tbody tr", timeout=90_000)
+    page.wait_for_selector("#plan-levers tbody tr")
 
 
 def test_a_changed_wish_strikes_the_answer_through_until_it_is_found_again(
@@ -206,7 +213,7 @@ def test_a_changed_wish_strikes_the_answer_through_until_it_is_found_again(
     page.wait_for_selector("#plan-say.former")
     assert "stale" in page.get_attribute("#plan-map", "class")
     assert page.is_disabled("#plan-show")
-    page.wait_for_selector("#plan-say:not(.former)", timeout=30_000)
+    page.wait_for_selector("#plan-say:not(.former)")
     assert "3.5 nN" in page.text_content("#plan-say")
     assert "so far" in page.text_content("#plan-far").lower()
     page.fill("#plan-force", "soft")
@@ -222,7 +229,7 @@ def test_its_states_are_shown_with_its_values(
     best = stages[-1]["points"][stages[-1]["best"][0]]
     view(page, address)
     page.click("#plan-show")
-    page.wait_for_selector("body[data-view=states][data-rows=done]", timeout=60_000)
+    page.wait_for_selector("body[data-view=states][data-rows=done]")
     given = urllib.parse.parse_qs(urllib.parse.urlsplit(page.url).fragment)
     assert given["set.drive.free_amplitude"] == [best["free"]]
     assert page.text_content("#states-heading") == "States at this setpoint: one"
@@ -236,7 +243,7 @@ def test_its_states_are_shown_with_its_values(
 def test_a_lever_of_the_table_is_taken(page: Any, address: str) -> None:
     view(page, address)
     page.select_option("#plan-lever", label="I have no lever yet")
-    page.wait_for_selector("#plan-levers tbody tr", timeout=150_000)
+    page.wait_for_selector("#plan-levers tbody tr")
     name = page.text_content("#plan-levers tbody tr button")
     page.click("#plan-levers tbody tr button")
     page.wait_for_selector("#notice:not([hidden])")
@@ -244,8 +251,4 @@ def test_a_lever_of_the_table_is_taken(page: Any, address: str) -> None:
     assert page.is_hidden("#plan-levers")
     assert f"set.cantilever.lever={name}" in urllib.parse.unquote_plus(page.url)
     page.click("#take-back")
-    for _ in range(100):
-        if "cantilever.lever" not in page.url:
-            break
-        page.wait_for_timeout(100)
-    assert "cantilever.lever" not in page.url
+    until(page, lambda: "cantilever.lever" not in page.url)

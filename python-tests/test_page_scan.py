@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsers import case_file, printed
+from browsers import WAIT, case_file, printed
 
 # What the page proposes for the DMT lever: 5000 drive periods a line, half the lever's rate.
 STEP = """
@@ -24,7 +24,7 @@ DMT = "view=scan&preset=dmt"
 @pytest.fixture(scope="module")
 def page(browser: Any) -> Any:
     page = browser.new_page(viewport={"width": 1440, "height": 1000})
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(1000 * WAIT)
     return page
 
 
@@ -43,7 +43,7 @@ def shown(page: Any, address: str, fragment: str) -> dict[str, Any]:
 
 
 def exact(page: Any) -> dict[str, Any]:
-    page.wait_for_selector("#strips[data-line=exact]", timeout=60_000)
+    page.wait_for_selector("#strips[data-line=exact]")
     return page.evaluate("document.getElementById('strips').line")
 
 

@@ -237,11 +237,17 @@ fn build_times(workspace: &Workspace) -> Result<Tally, String> {
 
 fn test_python(workspace: &Workspace) -> Result<Tally, String> {
     let mut tally = signatures(workspace, &["--check"])?;
-    let mut command = wheel::installed(workspace)?.program("pytest");
-    command.arg("python-tests");
+    let environment = wheel::installed(workspace)?;
     let program = workspace.target().join("release").join("nanotap");
-    command.env("NANOTAP", program);
-    tally += tests(&workspace.root, &mut command)?;
+    // Two files at a time; then, one after another, what depends on the time that something takes.
+    let two = "-n2 --dist=loadfile --no-loadscope-reorder";
+    for (chosen, more) in [("not alone", two), ("alone", "")] {
+        let mut command = environment.program("pytest");
+        command.args(["python-tests", "-m", chosen]);
+        command.args(more.split_whitespace());
+        command.env("NANOTAP", &program);
+        tally += tests(&workspace.root, &mut command)?;
+    }
     Ok(tally)
 }
 

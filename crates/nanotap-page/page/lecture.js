@@ -539,7 +539,8 @@ function study(share) {
 /** A figure of these panels, in one column. */
 function panelsOf(of, panels) {
   const many = (panel) => kind() === "motion" || panel.layers.filter(({ label }) => label).length > 4;
-  const named = (one) => ({ ...one, label: t("show.figure")[one.label] ?? one.label });
+  const word = (text) => t("show.figure")[text] ?? text;
+  const named = (one) => ({ ...one, label: word(one.label), ...(one.unit ? { unit: word(one.unit) } : {}) });
   const hidden = (panel) => ({ ...panel, title: "", x: named(panel.x), y: named(panel.y), layers: panel.layers.map((one) => (one.label ? named(one) : one)), legend: many(panel) ? "hidden" : panel.legend });
   const list = (panels ?? of.panels.map((_, k) => k)).flatMap((k) => (of.panels[k] ? [hidden(of.panels[k])] : []));
   return { ...of, rows: list.length, cols: 1, column_widths: [], row_heights: [], share_x: list.length > 1, panels: list };

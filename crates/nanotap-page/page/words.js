@@ -214,7 +214,7 @@ const english = {
       stepsHead: "Steps of the height that are the lever's",
       stepsFirst: "Steps of the height that are the lever's, {shown} of {count}",
       heads: { state: "state", share: "part of the image", phase: "phase lag", measured: "phase in the image", distance: "distance", height: "adds to the height", force: "peak force", line: "line", x: "position", pixel: "pixel", change: "change", step: "step in the image" },
-      figure: { "height $z$": "height $z$", "corrected height": "corrected height", "position $x$": "position $x$", "position $y$": "position $y$", "phase (°)": "phase (°)", measured: "measured", corrected: "corrected", undecided: "undecided", attractive: "attractive", repulsive: "repulsive", free: "free flight" },
+      figure: { "height $z$": "height $z$", "corrected height": "corrected height", "position $x$": "position $x$", "position $y$": "position $y$", phase: "phase", measured: "measured", corrected: "corrected", undecided: "undecided", attractive: "attractive", repulsive: "repulsive", free: "free flight" },
       files: { pixels: "States of the pixels (CSV)", corrected: "Corrected heights (GSF)" },
     },
     file: "your file", fit: "Find the values", force: "Force from the data alone", forceAbout: "Conservative force and dissipation against distance from the curve, without a contact law", calibrate: "Calibrate the lever", calibrateAbout: "Spring constant, resonance, Q and sensitivity from thermal noise: a spectrum, or a record of the lever at rest", example: "Try an example", drop: "Your curve over all states of the lever, the values that fit it, and the force without a law. A thermal spectrum or a record of noise calibrates the lever: spring constant, Q and sensitivity. Images of height, amplitude and phase tell in which state each pixel was taken. Drop a file of your instrument (JPK, Bruker, Asylum, Nanosurf …) or a CSV file here; its columns are named as in “distance (nm)”, “phase (deg)”. The file stays on this device.",
@@ -397,8 +397,8 @@ const english = {
     },
     /** Words of the program's figures. */
     figure: {
-      surface: "surface", trace: "trace", retrace: "retrace", "attractive state": "attractive state", "height $z$ (nm)": "height $z$ (nm)", "position $x$ (nm)": "position $x$ (nm)",
-      "drive frequency $Ω$": "drive frequency $Ω$", "max $W$ in a drive period": "max $W$ in a drive period", "time $τ / T$ (drive periods)": "time $τ / T$ (drive periods)", "tip deflection $W$": "tip deflection $W$",
+      surface: "surface", trace: "trace", retrace: "retrace", "attractive state": "attractive state", "height $z$": "height $z$", "position $x$": "position $x$",
+      "drive frequency $Ω$": "drive frequency $Ω$", "max $W$ in a drive period": "max $W$ in a drive period", "time $τ / T$": "time $τ / T$", "drive periods": "drive periods", "tip deflection $W$": "tip deflection $W$",
     },
     exact: "exact",
     periodOf: "period {period}", noPeriod: "no period", grows: "no motion at all: it grows without bound",

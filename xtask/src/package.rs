@@ -41,10 +41,29 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     check(&workspace.root, &mut command)
 }
 
+/// Whether a crate, or what cargo made of it, is one of this workspace by its name.
+fn is_own(name: &str) -> bool {
+    name.starts_with("nanotap") || name.starts_with("afm-")
+}
+
+/// Removes what tells cargo that the crates of this workspace are compiled, from the folder of a profile.
+/// All files of an archive have the same time, so that changed ones look current; dependencies stay.
+fn forget_compiled(profile: &Path) {
+    let Ok(known) = fs::read_dir(profile.join(".fingerprint")) else {
+        return;
+    };
+    for one in known.flatten() {
+        if is_own(&one.file_name().to_string_lossy()) {
+            let _ = fs::remove_dir_all(one.path());
+        }
+    }
+}
+
 /// Cargo assumes that a version never changes: files unpacked and compiled from an earlier state of
 /// the same version would be used instead of the new ones.
 fn forget(target: &Path) {
-    let _ = fs::remove_dir_all(target);
+    let _ = fs::remove_dir_all(target.join("package"));
+    forget_compiled(&target.join("debug"));
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let Some(home) = home.or_else(|| Some(env::home_dir()?.join(".cargo"))) else {
         return;
@@ -58,9 +77,7 @@ fn forget(target: &Path) {
     });
     let unpacked = registries.filter_map(|registry| fs::read_dir(registry.path()).ok());
     for crate_ in unpacked.flatten().flatten() {
-        let name = crate_.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with("nanotap") || name.starts_with("afm-") {
+        if is_own(&crate_.file_name().to_string_lossy()) {
             let _ = fs::remove_dir_all(crate_.path());
         }
     }
@@ -74,7 +91,12 @@ fn forget(target: &Path) {
 pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     let folder = workspace.target().join("sdist");
     // An archive of another version would be installed instead.
-    let _ = fs::remove_dir_all(&folder);
+    for old in with_extension(&folder, "gz") {
+        let _ = fs::remove_file(old);
+    }
+    let _ = fs::remove_dir_all(folder.join("environment"));
+    let build = folder.join("build");
+    forget_compiled(&build.join("release"));
     let mut pack = workspace.python_tool("maturin")?;
     pack.args(["sdist", "--out"]).arg(&folder);
     if !succeeds(&workspace.root, &mut pack)? {
@@ -86,11 +108,10 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     };
     let environment = Environment::empty(&workspace.root, folder.join("environment"))?;
     let mut install = environment.pip();
-    // In a separate folder: all files of an archive have the same time, and cargo would take build
-    // outputs of the checkout for current.
+    // In a separate folder: cargo would take build outputs of the checkout for current.
     install
         .arg(archive)
-        .env("CARGO_TARGET_DIR", folder.join("build"))
+        .env("CARGO_TARGET_DIR", build)
         .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0")
         .env("CARGO_PROFILE_RELEASE_DEBUG", "false");
     if !succeeds(&workspace.root, &mut install)? {

@@ -25,6 +25,8 @@ const ROUNDED: f64 = 1e-14;
 const HALVINGS: usize = 24;
 /// Largest number of pieces of a signal.
 pub const MAX_PIECES: usize = 200_000;
+/// Largest number of oscillations of a signal: a piece holds those of its last tone at most.
+pub const MAX_TURNS: f64 = MAX_PIECES as f64 * TONES as f64 / EXTENSION;
 
 /// A piece of a signal, in units of the drive's amplitude. Its time begins at 0.
 #[derive(Clone, Debug, PartialEq)]

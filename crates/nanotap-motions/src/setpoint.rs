@@ -1313,9 +1313,9 @@ impl Search<'_> {
     }
 }
 
-/// Distances over the reach, or the larger distance, within which two orbits are one; and within which they
-/// can be.
+/// Difference of the distances, over the reach or the larger distance, within which two orbits are one.
 const CERTAINLY_SAME: f64 = 1e-9;
+/// The same within which two orbits can be one.
 const SAME_DISTANCE: f64 = 1e-3;
 /// Relative error of the held quantity within which the orbit between two is at the setpoint: some ten times
 /// that to which an orbit at the setpoint is closed.

@@ -17,7 +17,7 @@ use nanotap_case::Case;
 use nanotap_case::quantity::Kind;
 use nanotap_case::table::{Entry, Header, Table};
 use nanotap_error::Error;
-use nanotap_model::drive_signal::{DriveSignal, MAX_PIECES, Pieces};
+use nanotap_model::drive_signal::{DriveSignal, MAX_PIECES, MAX_TURNS, Pieces};
 
 /// Standard deviations from the centre of a pulse to its beginning, where it has 2·10⁻¹⁶ of its peak.
 const REACH: f64 = 8.5;
@@ -94,6 +94,15 @@ impl Shape {
         }
     }
 
+    /// Its oscillations, where there can be many.
+    fn turns(self) -> f64 {
+        match self {
+            Self::Pulse { .. } => 0.0,
+            Self::Chirp { from, to, length } => 0.5 * (from + to) * length,
+            Self::Sinc { highest, length } => highest * length,
+        }
+    }
+
     /// The signal at a time from its beginning; 0 after its end.
     fn at(self, time: f64) -> f64 {
         let (length, middle) = (self.length(), 0.5 * self.length());
@@ -143,11 +152,7 @@ impl ReadSignal {
         after: usize,
     ) -> Result<Self, Error> {
         let pieces = Pieces::new().of(at, knots, peak);
-        let mut pieces = pieces.ok_or_else(|| {
-            wrong(format!(
-                "the signal needs more than {MAX_PIECES} pieces; give a slower one"
-            ))
-        })?;
+        let mut pieces = pieces.ok_or_else(too_many_pieces)?;
         pieces.extend((0..after).map(|_| DriveSignal::silence(1.0)));
         Ok(Self {
             words: words.to_owned(),
@@ -168,6 +173,12 @@ const HINT: &str = "write {drive_signal} as in \"pulse 0.5\", \"chirp 0.8 1.2 20
 
 fn wrong(message: impl Into<String>) -> Error {
     Error::option("drive_signal", message, HINT)
+}
+
+fn too_many_pieces() -> Error {
+    wrong(format!(
+        "the signal needs more than {MAX_PIECES} pieces; give a slower one"
+    ))
 }
 
 impl StatedSignal {
@@ -201,6 +212,10 @@ impl StatedSignal {
                 let length = shape.length();
                 if length > LONGEST {
                     return Err(wrong(format!("{length:.0} drive periods are too long")));
+                }
+                // Known before the signal is cut, which takes a while.
+                if shape.turns() > MAX_TURNS {
+                    return Err(too_many_pieces());
                 }
                 let steps = length.ceil().max(1.0);
                 let knot = |k: usize| length * k as f64 / steps;

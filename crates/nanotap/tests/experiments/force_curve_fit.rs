@@ -174,7 +174,7 @@ fn the_figure_shows_the_deflection_in_nanometres() {
     let free = ["sample.modulus", "gap.offset", "deflection.offset"];
     let report = fitted(&case("hertz", HERTZ), recorded(&curve, NOISE, 1), &free);
     let readings = &fit_figure(&report).panels[0];
-    assert_eq!(readings.y.label, "deflection (nm)");
+    assert_eq!(readings.y.words(), "deflection (nm)");
 }
 
 #[test]

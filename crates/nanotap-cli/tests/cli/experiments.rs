@@ -253,7 +253,7 @@ fn branches_run_over_quantities_of_the_case() {
     assert!(point["physical"]["A"].as_f64().unwrap() > 19e-9);
     assert!(folder.read("b.svg").contains("distance zc (nm)"));
     branch("24 nm", "10 kHz", &[]).refused(&["expected a length"]);
-    branch("24", "10 nm", &[]).refused(&["24 m"]);
+    branch("24", "10 nm", &[]).refused(&["24 m without a unit; did you mean 24 nm?"]);
     branch("24 Hz", "10 Hz", &[]).refused(&["gap.tip", "expected a length"]);
 }
 

@@ -309,7 +309,7 @@ def test_lengths_without_a_unit_are_remarked_upon():
 
 
 def test_a_curve_from_metres_away_is_refused():
-    with pytest.raises(ValueError, match="5 m, but nothing acts"):
+    with pytest.raises(ValueError, match="5 m without a unit; did you mean 5 nm"):
         nanotap.approach(nanotap.Case(**CASE), from_=5)
 
 

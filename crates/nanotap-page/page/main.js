@@ -45,11 +45,21 @@ let amplitude = NaN;          // of the displayed motion
 let searching = null;         // the case of the motions that are being searched
 let steps = 0;                // entries of the history that can be undone
 
-export function say(error) {
+/** Says what is wrong with the values; an answer to good ones ends it. What is wrong with a file stays until the
+ *  user goes on. */
+export function say(error, ofFile = false) {
   const message = $("message");
+  if (!error && message.dataset.of === "file") return;
+  message.dataset.of = ofFile ? "file" : "values";
   message.hidden = !error;
   message.textContent = local(error?.message ?? "");
   knobs.mark(error?.keys ?? []);
+}
+
+/** The user goes on: nothing is wrong until it is found again. */
+function goOn() {
+  delete $("message").dataset.of;
+  say(null);
 }
 
 /** Marks the displayed motion as one of other values, or not. */
@@ -275,6 +285,7 @@ async function exported(format) {
 function fresh(name) {
   const chosen = texts.has(name) ? { preset: "", case: name } : { preset: name, case: "" };
   Object.assign(state, { ...chosen, set: {}, start: "", compare: "", study: {}, ran: "", views: {}, lesson: "" });
+  goOn();
   remembered();
   takeOver();
 }
@@ -282,7 +293,7 @@ function fresh(name) {
 async function openFiles(files) {
   try {
     if (files.length) fresh(await link.open(files));
-  } catch (error) { if (!superseded(error)) say(error); }
+  } catch (error) { if (!superseded(error)) say(error, true); }
 }
 
 /** Shows which case it is; an opened file comes into the list. */
@@ -407,6 +418,7 @@ async function begin() {
   $("undo").addEventListener("click", () => { steps -= 1; $("undo").disabled = steps <= 0; history.back(); });
   const onChange = (_, finished, note) => {
     moving = !finished;
+    if ($("message").dataset.of === "file") goOn();
     if (note !== undefined) $("note").textContent = local(note);
     // While a slider moves, the address is not changed.
     if (finished) remembered();

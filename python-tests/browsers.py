@@ -104,7 +104,7 @@ def asked(
 
 
 class Answers:
-    """What the server answers to questions that take long; it is asked each of them once."""
+    """Answers of the server to requests that take long, each asked for once."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -117,7 +117,7 @@ class Answers:
         return self.known[question]
 
     def given(self, page: Any, path: str, only_known: bool = False) -> None:
-        """From now on a page gets them, too; what is not known is asked now or left to the server."""
+        """Gives them to a page that makes the same requests; new ones are made now or left to the server."""
 
         def give(route: Any) -> None:
             body = route.request.post_data_json

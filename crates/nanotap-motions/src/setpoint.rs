@@ -22,8 +22,8 @@
 //! approach at which the shift has its value is chosen. Frequency and strength of the drive there take
 //! the place of the case's own.
 //!
-//! Fails by omission: orbits on branches that none of these meets, and a setpoint that the quantity passes twice between
-//! two neighbouring orbits of a branch.
+//! Fails by omission: orbits on branches that none of these meets, and a setpoint that the quantity
+//! passes twice between two neighbouring orbits of a branch.
 
 use nanotap_dynamics::{
     BranchPoint, ContinuationOptions, Control, DiagramOptions, PeriodicOrbit, ShootingOptions,

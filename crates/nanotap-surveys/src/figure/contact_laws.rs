@@ -8,6 +8,7 @@ use nanotap_case::physical::Kind;
 use nanotap_case::units::Units;
 use nanotap_motions::branch::PointReport;
 use nanotap_motions::figure::branch::{PlottedQuantity, runs};
+use nanotap_motions::figure::panels::largest_of;
 
 /// Loops of force and indentation under each law; if branches were followed, also dissipation and
 /// amplitude against the drive frequency, dashed where unstable.
@@ -29,16 +30,11 @@ pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
         .with(followed_panel(comparison, "first_harmonic", units))
 }
 
-/// Largest absolute value, 0 if there are none.
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(0.0, |m, v| m.max(v.abs()))
-}
-
 /// Force against gap of nonlinear laws, on a slow approach and back.
 fn force_panel(comparison: &Comparison, units: &Units) -> Panel {
     let curves = || comparison.samples.iter().flat_map(|s| &s.force_curve);
-    let (length, length_unit) = units.axis(Kind::Length, largest(curves().map(|p| p[0])));
-    let (force, force_unit) = units.axis(Kind::Force, largest(curves().map(|p| p[1])));
+    let (length, length_unit) = units.axis(Kind::Length, largest_of(curves().map(|p| p[0])));
+    let (force, force_unit) = units.axis(Kind::Force, largest_of(curves().map(|p| p[1])));
     let mut panel = Panel::new(
         Axis::linear("gap $d$").unit(length_unit).tight(),
         Axis::linear("force on the tip").unit(force_unit),
@@ -58,8 +54,8 @@ fn force_panel(comparison: &Comparison, units: &Units) -> Panel {
 
 fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
     let orbits = || comparison.samples.iter().filter_map(|s| s.orbit.as_ref());
-    let deepest = largest(orbits().map(|o| o.observables.indentation));
-    let strongest = largest(orbits().map(|o| o.observables.peak_force));
+    let deepest = largest_of(orbits().map(|o| o.observables.indentation));
+    let strongest = largest_of(orbits().map(|o| o.observables.peak_force));
     let (length, length_unit) = units.axis(Kind::Length, deepest);
     let (force, force_unit) = units.axis(Kind::Force, strongest);
     let mut panel = Panel::new(
@@ -99,9 +95,13 @@ fn followed_panel(comparison: &Comparison, shown: &str, units: &Units) -> Panel 
             .map_or_else(Vec::new, |b| b.points.clone())
     };
     let all: Vec<PointReport> = comparison.samples.iter().flat_map(points).collect();
-    let (y, factor) = shown.axis(true, |kind| units.si(kind), largest(all.iter().map(value)));
+    let (y, factor) = shown.axis(
+        true,
+        |kind| units.si(kind),
+        largest_of(all.iter().map(value)),
+    );
     let (frequency, frequency_unit) =
-        units.axis(Kind::Frequency, largest(all.iter().map(|p| p.parameter)));
+        units.axis(Kind::Frequency, largest_of(all.iter().map(|p| p.parameter)));
     let mut panel = Panel::new(
         Axis::linear("drive frequency $Ω$")
             .unit(frequency_unit)

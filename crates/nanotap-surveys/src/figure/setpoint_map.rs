@@ -7,8 +7,8 @@ use crate::figure::window::outline;
 use crate::setpoint_map::{SetpointMap, SetpointPoint};
 use crate::window::Window;
 use nanotap_case::physical::Kind;
-use nanotap_case::units::prefixed;
 use nanotap_dataset::Store;
+use nanotap_motions::figure::panels::si_axis;
 
 /// Categories of the points, with their words and colours.
 const CATEGORIES: [(&str, Colour); 6] = [
@@ -82,18 +82,18 @@ pub(crate) fn figure(store: &Store, window: &Window, map: &SetpointMap) -> Figur
     let Some([_, highest]) = map.step_heights else {
         return Figure::single(states);
     };
-    let (factor, unit) = prefixed(Kind::Length, 1.0, highest);
+    let (axis, factor) = si_axis("height of the false step", Kind::Length, highest);
     let heights = points.iter().map(|point| {
         let height = point.step_height.unwrap_or(f64::NAN);
         factor * height
     });
-    let scale = Axis::linear("").unit(unit.clone());
+    let scale = Axis::linear("").unit(&axis.unit);
     let layer = GridScale::heatmap(&x, &y, heights, scale);
     let mut steps = Panel::new(x.axis(), y.axis()).with(layer);
     if !open.is_empty() {
         steps = steps.with(dots());
     }
-    let steps = steps.title(format!("height of the false step ({unit})"));
+    let steps = steps.title(axis.words());
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .with(states)

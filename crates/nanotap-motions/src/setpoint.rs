@@ -51,6 +51,7 @@ use nanotap_model::nonlinear::Equilibrium;
 use nanotap_observe::frame::{Cell, Frame, Rows, frame};
 use nanotap_observe::table::{Observable, shown_phase};
 use nanotap_observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
+use nanotap_quantity::number::significant;
 use nanotap_study::FreeMotion;
 use nanotap_study::value::Amount;
 
@@ -295,9 +296,9 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     }
     let (held, free) = held_quantity(case)?;
     let mut search = Search::new(case, held, free);
-    let range = (0.0, FARTHER * free.reach);
-    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
-    let (_, place) = approach(&mut sweep, std::slice::from_mut(&mut search), control)?;
+    let (mut sweep, place) = from_far(case, &[held], free, control)?;
+    let searches = std::slice::from_mut(&mut search);
+    let (_, place) = approach(&mut sweep, place, searches, control)?;
     let reached = search.result(&sweep)?;
     // What a lever shows at this distance that comes from near.
     sweep.allow_steps(OTHERS_STEPS);
@@ -376,10 +377,32 @@ fn solve_shift(
 ) -> Result<SetpointReport, Error> {
     // What depends on the frequency, as a loss tangent, is that of the frequency with the shift.
     let case = &at_shift(case, shift, free)?;
-    let options = FrequencyModulationOptions {
+    let unit = case.physical().ok_or_else(no_setpoint)?.scales.length;
+    let mut options = FrequencyModulationOptions {
         shift: Some(Amount::from(format!("{shift} Hz").as_str())),
         ..FrequencyModulationOptions::default()
     };
+    // The shift may be passed beyond the reach of the tip already.
+    let mut far = crate::approach::BEYOND;
+    while far <= FARTHEST {
+        let distance = |far: f64| {
+            let text = format!("{:e} m", far * free.reach * unit);
+            Some(Amount::from(text.as_str()))
+        };
+        let probe = FrequencyModulationOptions {
+            from: distance(far),
+            to: distance(0.95 * far),
+            points: 2,
+            ..FrequencyModulationOptions::default()
+        };
+        let probe = frequency_modulation::frequency_modulation(case, &probe, control)?;
+        let first = probe.table.iter().find_map(|p| p.modulation_si);
+        if !first.is_some_and(|first| first.frequency_shift / shift >= 1.0) {
+            break;
+        }
+        far *= 2.0;
+        options.from = distance(far);
+    }
     let curve = frequency_modulation::frequency_modulation(case, &options, control)?;
     if control.is_cancelled() {
         return Err(cancelled());
@@ -485,14 +508,61 @@ const fn branch_of(seen: &Observables) -> &'static str {
     }
 }
 
-/// Follows the lever from far until every search has ended; the pieces of its way, and the place where it
-/// is then.
+/// Prepares an approach that begins where no setpoint is reached yet, and the place where the lever is
+/// there. Long-range attraction, as that of a voltage, changes the motion far beyond the reach of the tip.
+///
+/// # Errors
+/// When there is no such distance, or the case has no model.
+fn from_far<'a>(
+    case: &Case,
+    setpoints: &[HeldQuantity],
+    free: FreeMotion,
+    control: &'a Control<'a>,
+) -> Result<(DistanceSweep<'a>, Place), Error> {
+    let mut far = FARTHER;
+    loop {
+        let range = (0.0, far * free.reach);
+        let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
+        let place = sweep.free()?;
+        let passed = setpoints.iter().find_map(|held| {
+            let value = value_in(held, &sweep, &place);
+            held.is_reached(value).then_some((held, value))
+        });
+        let Some((held, value)) = passed else {
+            return Ok((sweep, place));
+        };
+        if far >= FARTHEST {
+            let distance = distance_text(case, sweep.farthest());
+            return Err(Error::numerics(format!(
+                "the setpoint {} is passed before the tip is near: {} at {distance} already, the \
+                 farthest distance that is looked at; change drive.setpoint, or give gap.tip",
+                held.words(),
+                held.state(value),
+            )));
+        }
+        far *= 2.0;
+    }
+}
+
+/// The held quantity in a place; NaN where it cannot be measured.
+fn value_in(held: &HeldQuantity, sweep: &DistanceSweep<'_>, place: &Place) -> f64 {
+    let gap = sweep.farthest();
+    match place {
+        Place::On { stretch, .. } => sweep
+            .orbit_at(*stretch, gap)
+            .map_or(f64::NAN, |orbit| value_at(held, sweep, gap, &orbit)),
+        Place::Off { .. } => value_from(held, sweep, gap, &sweep.state(place), AVERAGED_PERIODS),
+    }
+}
+
+/// Follows the lever from a place far away until every search has ended; the pieces of its way, and the
+/// place where it is then.
 fn approach(
     sweep: &mut DistanceSweep<'_>,
+    place: Place,
     searches: &mut [Search<'_>],
     control: &Control<'_>,
 ) -> Result<(Vec<Piece>, Place), Error> {
-    let place = sweep.free()?;
     sweep.piece_a_step = true;
     let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| {
         let Some(first) = searches.iter().find(|search| search.found.is_none()) else {
@@ -511,7 +581,7 @@ fn approach(
     }
     let nearest = pieces.last().map(|piece| piece.to);
     for search in searches {
-        search.nearest_gap = nearest.unwrap_or(search.nearest_gap);
+        search.nearest_gap = nearest.unwrap_or(sweep.farthest());
     }
     Ok((pieces, place))
 }
@@ -557,9 +627,9 @@ pub fn reached_distances(
         let held = HeldQuantity::new(held, &free, view.scales.force)?;
         searches.push(Search::new(case, held, free));
     }
-    let range = (0.0, FARTHER * free.reach);
-    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
-    approach(&mut sweep, &mut searches, control)?;
+    let helds: Vec<HeldQuantity> = searches.iter().map(|search| search.held).collect();
+    let (mut sweep, place) = from_far(case, &helds, free, control)?;
+    approach(&mut sweep, place, &mut searches, control)?;
     let results = searches.iter_mut().map(|search| search.result(&sweep));
     Ok(results
         .map(|result| match result {
@@ -794,6 +864,8 @@ const MIN_POINTS: usize = 16;
 
 /// First distance of the approach, as a multiple of the reach of the free tip.
 const FARTHER: f64 = 2.0;
+/// Multiple of the reach beyond which no approach begins, however far the sample acts.
+const FARTHEST: f64 = 256.0;
 
 /// The quantity that is held, in the model's units; a phase in degrees.
 #[derive(Clone, Copy, Debug)]
@@ -886,7 +958,7 @@ impl HeldQuantity {
         match self.setpoint {
             Held::Amplitude(ratio) => format!("A/A0 = {ratio}"),
             Held::PeakForce(force) => format!("peak force = {}", Kind::Force.format(force)),
-            Held::Phase(phase) => format!("phase = {phase}°"),
+            Held::Phase(phase) => format!("phase = {}°", significant(phase, 8)),
             Held::Shift(shift) => format!("frequency shift = {}", Kind::Frequency.format(shift)),
         }
     }
@@ -913,6 +985,15 @@ impl HeldQuantity {
 /// A phase in degrees within half a turn of another.
 fn near_phase(phase: f64, of: f64) -> f64 {
     phase - 360.0 * ((phase - of) / 360.0).round()
+}
+
+/// A distance in the model's unit of length as text.
+fn distance_text(case: &Case, gap: f64) -> String {
+    let view = case.physical();
+    view.map_or_else(
+        || gap.to_string(),
+        |view| Kind::Length.format(gap * view.scales.length),
+    )
 }
 
 /// The search for the setpoint along the way from far.
@@ -1037,7 +1118,7 @@ impl<'a> Search<'a> {
             free,
             before: None,
             nearest: held.far,
-            nearest_gap: FARTHER * free.reach,
+            nearest_gap: f64::INFINITY,
             found: None,
         }
     }
@@ -1056,27 +1137,14 @@ impl Search<'_> {
                 "the setpoint {words} was not reached: {}, to gap.tip = {}; give gap.tip, or \
                  {remedy} drive.setpoint",
                 budget_text(steps),
-                self.distance_text(self.nearest_gap),
+                distance_text(self.case, self.nearest_gap),
             ),
             None => format!(
                 "the setpoint {words} is not reached on the way to the sample's own position \
-                 (gap.tip = 0), {} {}; {remedy} drive.setpoint, or give gap.tip",
-                if self.held.is_amplitude() {
-                    "where"
-                } else {
-                    "nearest to it"
-                },
+                 (gap.tip = 0), nearest to it {}; {remedy} drive.setpoint, or give gap.tip",
                 self.held.state(self.nearest),
             ),
         }))
-    }
-
-    /// Formats a distance that is given in the model's unit of length.
-    fn distance_text(&self, gap: f64) -> String {
-        self.case.physical().map_or_else(
-            || gap.to_string(),
-            |view| Kind::Length.format(gap * view.scales.length),
-        )
     }
 
     /// Whether the search ends in a piece of the way.
@@ -1108,8 +1176,8 @@ impl Search<'_> {
                         held.words(),
                         held.value_text(before),
                         held.value_text(value),
-                        self.distance_text(from),
-                        self.distance_text(*gap)
+                        distance_text(self.case, from),
+                        distance_text(self.case, *gap)
                     )))
                 };
                 let crossed = before.as_ref().map(|last| {
@@ -1152,7 +1220,7 @@ impl Search<'_> {
                 self.found = Some(Err(Error::numerics(format!(
                     "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
                      reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
-                    self.distance_text(gap),
+                    distance_text(self.case, gap),
                     held.words(),
                     match held.setpoint {
                         Held::Amplitude(_) => "amplitude",

@@ -51,7 +51,7 @@ pub use quasistatic::{states_at, states_near};
 
 /// Where the default curve begins, in units of the tip's free reach: far enough to see the
 /// free motion, and branches that reach beyond it.
-const BEYOND: f64 = 1.25;
+pub(crate) const BEYOND: f64 = 1.25;
 /// Largest first distance of a sample that acts in contact only, in reaches of the free tip: a
 /// farther one takes its number of steps and shows nothing.
 const MAX_REACHES: f64 = 1e3;
@@ -446,7 +446,7 @@ impl Distances {
         let to = match (self.to, closest) {
             (Some(to), _) => to,
             (None, Some(closest)) => closest + LEAST_AMPLITUDE * (from - closest),
-            (None, None) => from.min(0.0),
+            (None, None) => 0.0,
         };
         if !(from.is_finite() && to.is_finite() && from > to) {
             return Err(Error::input(

@@ -24,10 +24,9 @@ use nanotap_study::averaged_orbits::averaged_orbits;
 use nanotap_study::start_box::default_starts;
 
 use super::{
-    FARTHER, HeldQuantity, OTHERS_STEPS, Search, SetpointSolution, Trace, approach, cancelled,
+    HeldQuantity, OTHERS_STEPS, Search, SetpointSolution, Trace, approach, cancelled, from_far,
     held_quantity,
 };
-use crate::approach::SETPOINT_PERIODS;
 use crate::approach::distance_sweep::{DistanceSweep, End, Piece, Place};
 use crate::short_run::short_run;
 
@@ -111,9 +110,9 @@ pub fn states_at_setpoint(
 ) -> Result<SetpointStates, Error> {
     let (held, free) = held_quantity(case)?;
     let mut search = Search::new(case, held, free);
-    let range = (0.0, FARTHER * free.reach);
-    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
-    let (mut pieces, place) = approach(&mut sweep, std::slice::from_mut(&mut search), control)?;
+    let (mut sweep, place) = from_far(case, &[held], free, control)?;
+    let searches = std::slice::from_mut(&mut search);
+    let (mut pieces, place) = approach(&mut sweep, place, searches, control)?;
     let mut reasons: Vec<Undecided> = Vec::new();
     let reached = search.result(&sweep).ok();
     reasons.extend(spent(&sweep));

@@ -12,6 +12,60 @@ use nanotap::study::{Computation as _, FreeMotion};
 
 use crate::common::{DMT, EV, HERTZ, lever};
 
+/// A voltage acts far beyond the reach of the tip: an approach that began at twice the reach found the
+/// lever below the setpoint already.
+#[test]
+fn a_setpoint_is_found_where_a_voltage_acts_from_far() {
+    let words = [
+        "modes=1",
+        "cantilever.k=2.8 N/m",
+        "cantilever.f0=75 kHz",
+        "cantilever.Q=240",
+        "tip.radius=20 nm",
+        "sample.law=dmt + electrostatic",
+        "sample.modulus=2.2 GPa",
+        "sample.hamaker=6.5e-20 J",
+        "sample.voltage=8 V",
+        "drive.frequency=75 kHz",
+        "drive.free_amplitude=15 nm",
+    ];
+    let with = |word: &str| {
+        let words = words.iter().map(|word| (*word).to_owned());
+        Case::parse(None, &words.chain([word.to_owned()]).collect::<Vec<_>>())
+    };
+    let report = solve_setpoint(&with("drive.setpoint=0.7").unwrap(), &Control::default()).unwrap();
+    assert!((report.zc() - 41.5e-9).abs() < 2e-9, "{}", report.zc());
+    let there = with(&format!("gap.tip={:e} m", report.zc())).unwrap();
+    let found = crate::common::found(&there).observables;
+    let free = FreeMotion::of(&there.model().unwrap()).amplitude;
+    assert!((found.first_harmonic / free - 0.7).abs() < 1e-6);
+    // So is a shift of the frequency, which goes with the gradient of 1/(d (d + R)).
+    let shifts = ["drive.setpoint=-30 Hz", "drive.setpoint=-20 Hz"];
+    let [near, far] = shifts.map(|word| {
+        let found = solve_setpoint(&with(word).unwrap(), &Control::default()).unwrap();
+        found.zc()
+    });
+    assert!((1.12..1.25).contains(&(far / near)), "{near} {far}");
+}
+
+/// The force in contact leaves out the attraction in flight: against a sum over the time series.
+#[test]
+fn the_mean_force_in_contact_is_that_of_the_contact() {
+    let model = quick(20.0, 15.0, &DMT).model().unwrap();
+    let start = vec![0.0; model.dimension()];
+    let seen = measure(&model, &start, 30, ObservableSet::ALL).unwrap();
+    let (mut sum, mut count) = (0.0, 0.0);
+    nanotap::observe::time_series::sample(&model, &start, 30, 20_000, |row| {
+        let [force, contact] = [row[4], row[5]];
+        sum += force * contact;
+        count += contact;
+    })
+    .unwrap();
+    let found = seen.contact_force.unwrap();
+    assert!(count > 1000.0 && (sum / count / found - 1.0).abs() < 1e-3);
+    assert!(found > 1.02 * seen.mean_force / seen.contact_fraction);
+}
+
 /// A lever whose transient lasts a few tens of periods.
 fn quick(amplitude: f64, gap: f64, sample: &[&str]) -> Case {
     lever((0.9, 30.0, "100 kHz"), (amplitude, gap), sample)

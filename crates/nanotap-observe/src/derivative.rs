@@ -22,14 +22,14 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value as Json, json};
 
 use super::clearance::Clearance;
-use super::functional::{Requirements, Signal, Tone};
+use super::functional::{Requirements, Signal, Tone, in_contact};
 use super::measure::beginnings;
 use super::measured::{Beginnings, Impacts, Measured, MeasuredValues};
 use super::number::Phasor;
 use super::record::measure;
 use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
 use super::value::Value;
-use super::varied_motion::{Change, Varied, gather};
+use super::varied_motion::{Change, Varied, Wanted, gather};
 use nanotap_case::{Case, CaseError, Held, Key};
 use nanotap_model::model_map::ModelMap;
 use nanotap_model::nonlinear::{self, Nonlinear};
@@ -394,7 +394,12 @@ fn tip_changes(
 ) -> Result<Vec<[f64; 2]>, MotionError> {
     let tip = nanotap_volterra::VariedOutput::fixed(nonlinear.output(&model.tip, 0.0));
     let first = accumulate::Functional::Fourier(0, Tone::First.frequency(model));
-    let gathered = gather(nonlinear, state, 1, changes, (&[tip], &[first]), None)?;
+    let wanted = Wanted {
+        outputs: &[tip],
+        of_contact: &[false],
+        functionals: &[first],
+    };
+    let gathered = gather(nonlinear, state, 1, changes, wanted, None)?;
     let of = |varied: &Varied| {
         let integral = Phasor::from(varied.values[0]);
         let component = integral.times(Dual::constant(2.0) / varied.duration);
@@ -608,7 +613,16 @@ impl<'a> Followed<'a> {
             .map(|of| varied(Signal::HeightRate, of.model, of.tangent))
             .collect();
         let rate = under(rates.iter().collect(), 0.0);
-        let wanted = (outputs.as_slice(), &*first.functionals());
+        let signals = first.required.signals.iter();
+        let of_contact: Vec<bool> = signals
+            .map(|signal| signal.is_of_contact())
+            .chain([false])
+            .collect();
+        let wanted = Wanted {
+            outputs: &outputs,
+            of_contact: &of_contact,
+            functionals: &first.functionals(),
+        };
         let gathered = gather(nonlinear, state, period, changes, wanted, Some(&rate))?;
         let of = all.iter().zip(gathered);
         Ok(of
@@ -667,6 +681,10 @@ fn varied(signal: Signal, model: &Model, tangent: &ModelTangent) -> VariedOutput
         Signal::Force => VariedOutput {
             value: model.force.clone(),
             change: tangent.force.clone(),
+        },
+        Signal::ContactForce => VariedOutput {
+            value: in_contact(model, &model.force),
+            change: in_contact(model, &tangent.force),
         },
         Signal::Power(term) => VariedOutput {
             value: term.outputs(model),

@@ -22,6 +22,8 @@ pub(super) enum Signal {
     HeightRate,
     /// Force of the sample on the tip.
     Force,
+    /// Force of the sample on the tip while both touch, else 0.
+    ContactForce,
     /// Slope at the tip; 0 for an oscillator.
     Slope,
     /// A factor of a power.
@@ -33,10 +35,15 @@ impl Signal {
     /// output; dimensionless.
     pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
         match self {
-            Self::Force => 1.0,
+            Self::Force | Self::ContactForce => 1.0,
             Self::Power(term) => term.force_part(nonlinear),
             _ => 0.0,
         }
+    }
+
+    /// Whether a signal is 0 unless tip and sample touch.
+    pub(super) const fn is_of_contact(self) -> bool {
+        matches!(self, Self::ContactForce)
     }
 
     /// The signal as outputs of the state, one per regime.
@@ -52,6 +59,7 @@ impl Signal {
                 model.system.regimes().iter().map(rate).collect()
             }
             Self::Force => model.force.clone(),
+            Self::ContactForce => in_contact(model, &model.force),
             Self::Slope => same(
                 &model
                     .beam
@@ -61,6 +69,13 @@ impl Signal {
             Self::Power(term) => term.outputs(model),
         }
     }
+}
+
+/// Outputs, one per regime, that are 0 unless tip and sample touch.
+pub(super) fn in_contact(model: &Model, outputs: &[Output]) -> Vec<Output> {
+    let each = outputs.iter().zip(&model.contact);
+    let masked = each.map(|(output, touches)| output.scaled(f64::from(u8::from(*touches))));
+    masked.collect()
 }
 
 /// A frequency of the drive.

@@ -208,7 +208,7 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// Time mean of the force in contact; `None` without contact.
     pub(super) fn mean_contact_force(&mut self) -> Option<D> {
-        let impulse = self.mean(Signal::Force) * self.duration();
+        let impulse = self.value(Functional::Integral(Signal::ContactForce)).re;
         let time = self.contact_time();
         (time.value() > 0.0).then(|| impulse / time)
     }
@@ -224,8 +224,8 @@ impl<'a, D: Number> Measured<'a, D> {
         if self.is_beam() { 1.0 } else { -1.0 }
     }
 
-    /// Peak force of the sample on the tip: 0 without contact. Impacts on a rigid stop are impulses
-    /// and do not count.
+    /// Greatest force with which the sample pushes the tip, 0 if it only pulls. Impacts on a rigid stop
+    /// are impulses and do not count.
     pub(super) fn peak_force(&mut self) -> D {
         self.greatest(Signal::Force).at_least(0.0)
     }

@@ -53,7 +53,7 @@ impl Engine for Nonlinear<'_> {
     fn start(&self, state: &[f64], _: RecordOptions) -> Result<Box<dyn Run + '_>, MotionError> {
         let clearance = self.required.clearance;
         let clearance = clearance.then(|| SampledClearance::new(self.model, self.engine));
-        let start = (stored_by_lever(self.model, state, 0.0), f64::NAN);
+        let start = (stored_by_lever(self.model, state, 0.0), None);
         Ok(Box::new(NonlinearRun {
             of: self,
             flow: Flow::new(Arc::clone(&self.engine.system)),
@@ -84,8 +84,8 @@ struct NonlinearRun<'a> {
     contacts: Beginnings<f64>,
     events: Vec<ContactEvent>,
     clearance: Option<SampledClearance>,
-    /// Energy stored in lever and law at the beginning, and now.
-    energies: [(f64, f64); 2],
+    /// Energy stored in the lever, and in the law if it is known, at the beginning and now.
+    energies: [(f64, Option<f64>); 2],
     lows: Vec<f64>,
     highs: Vec<f64>,
     recorded: Vec<Trajectory>,
@@ -112,11 +112,11 @@ impl Run for NonlinearRun<'_> {
             law.energy(sample.branch, sample.gap)
         };
         if self.periods == 0 {
-            self.energies[0].1 = energy(start).unwrap_or(0.0);
+            self.energies[0].1 = energy(start);
         }
         self.energies[1] = (
             stored_by_lever(self.of.model, &self.state, end_phase(self.of.model)),
-            energy(end).unwrap_or(0.0),
+            energy(end),
         );
         self.periods += 1;
         if record {
@@ -133,7 +133,10 @@ impl Run for NonlinearRun<'_> {
         let run = *self;
         let (model, nonlinear) = (run.of.model, run.of.engine);
         let [before, after] = run.energies;
-        let by_sample = after.1 - before.1;
+        let by_sample = after
+            .1
+            .zip(before.1)
+            .map_or(0.0, |(end, start)| end - start);
         let functionals = run.of.required.functionals.iter().copied();
         let found = MeasuredValues {
             values: functionals
@@ -169,7 +172,16 @@ impl NonlinearRun<'_> {
         let mut sums: Vec<Complex> = vec![Complex::default(); functionals.len()];
         let outputs = &self.of.outputs;
         for Node { weight, sample, .. } in nodes.iter().filter(|node| node.weight != 0.0) {
-            let values: Vec<f64> = outputs.iter().map(|o| read(nonlinear, o, sample)).collect();
+            let touches = nonlinear.contact[sample.branch];
+            let signals = outputs.iter().zip(&self.of.required.signals);
+            let values: Vec<f64> = signals
+                .map(
+                    |(output, signal)| match signal.is_of_contact() && !touches {
+                        true => 0.0,
+                        false => read(nonlinear, output, sample),
+                    },
+                )
+                .collect();
             for (sum, functional) in sums.iter_mut().zip(functionals) {
                 let time = offset + sample.time;
                 functional.add_node(sum, *weight, &values, |omega| omega * time);

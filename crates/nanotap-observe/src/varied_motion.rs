@@ -38,6 +38,15 @@ pub(super) struct Varied {
     pub(super) duration: Dual,
 }
 
+/// What is measured of a motion.
+pub(super) struct Wanted<'a> {
+    pub(super) outputs: &'a [VariedOutput],
+    /// Whether each output is 0 unless tip and sample touch.
+    pub(super) of_contact: &'a [bool],
+    /// Functionals of the outputs.
+    pub(super) functionals: &'a [Functional],
+}
+
 /// Follows `periods` drive periods from `state` and computes, for each of the changes, the
 /// functionals of the outputs. `rate` is the rate of the tip's height. Changes with a parameter
 /// come last.
@@ -49,7 +58,11 @@ pub(super) fn gather(
     state: &[f64],
     periods: usize,
     changes: &[Change],
-    (outputs, functionals): (&[VariedOutput], &[Functional]),
+    Wanted {
+        outputs,
+        of_contact,
+        functionals,
+    }: Wanted<'_>,
     rate: Option<&VariedOutput>,
 ) -> Result<Vec<Varied>, MotionError> {
     let n = nonlinear.system.dimension();
@@ -73,9 +86,13 @@ pub(super) fn gather(
         nonlinear.end(&flow, &mut state);
         let before = count as f64 * period;
         run.visit(outputs, fastest, |at| {
+            let is_zero = |output: usize| of_contact[output] && !touches[at.branch];
             for (column, varied) in all.iter_mut().enumerate() {
                 let numbers = 0..outputs.len();
-                let value = |output| Dual::new(at.values[output], at.change(output, column));
+                let value = |output| match is_zero(output) {
+                    true => Dual::default(),
+                    false => Dual::new(at.values[output], at.change(output, column)),
+                };
                 let values: Vec<Dual> = numbers.map(value).collect();
                 let weight = Dual::new(at.weight, at.widening[column]);
                 // The frequency falls as the period grows; the previous periods end at the same

@@ -53,6 +53,8 @@ impl VariedOutput {
 pub struct Reading<'a> {
     /// Time of the place on the unvaried motion, in the system's unit of time.
     pub time: f64,
+    /// Number of the law's branch.
+    pub branch: usize,
     /// Weight in integrals over time, in the system's unit of time; 0 at the ends of steps.
     pub weight: f64,
     /// Changes, one per column, of the length of time that the step covers in an integral, from its
@@ -271,6 +273,7 @@ impl Variation {
                 }
                 take(&Reading {
                     time: place.time,
+                    branch: piece.branch,
                     weight: weight * piece.map.rate(piece.length, u),
                     widening: &widening,
                     shifts: &of.shifts,

@@ -429,7 +429,7 @@ impl Follower<'_> {
             zc: held.drives().gap * scales.length,
             tones: [0, 1].map(|k| self.reading(held, k, forces.tones[k], &readings[k])),
             mean_force: forces.mean * scales.force,
-            peak_force: forces.largest * scales.force,
+            peak_force: forces.largest.max(0.0) * scales.force,
             least_force: forces.lowest * scales.force,
             closest: forces.closest * scales.length,
             growth: held.growth,

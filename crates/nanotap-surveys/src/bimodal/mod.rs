@@ -157,7 +157,7 @@ rows! {
         /// Time mean of the force on the tip in N.
         #[schemars(extend("x-unit" = "N"))]
         pub mean_force: f64,
-        /// Largest force on the tip in N.
+        /// Largest force with which the sample pushes the tip in N; 0 where it only pulls.
         #[serde(rename = "F_max")]
         pub peak_force: f64 = Force, "peak force $F_{max}$", "F_max", Prefixed(4),
         /// Lowest force on the tip in N.

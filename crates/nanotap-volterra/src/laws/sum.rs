@@ -215,7 +215,11 @@ impl ForceLaw for Sum {
 
     fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
         self.split(branch)
-            .map(|(_, term, own)| term.energy(own, gap))
+            .map(|(_, term, own)| {
+                // Out of contact a term that dissipates stores nothing.
+                let stored = term.energy(own, gap);
+                stored.or_else(|| term.vanishes(own).then_some(0.0))
+            })
             .sum()
     }
 

@@ -43,6 +43,25 @@ pub(super) fn level(force: &Smooth, nodes: &Nodes, far: f64) -> f64 {
     }
 }
 
+/// Adds to standard errors what is not known between rows: `values` are those of a function at the
+/// distances `x`, `measured` those at the sorted closest approaches of the rows. Between two rows each
+/// value between theirs is as likely, and what lies outside is doubtful by as much; beyond the last row all of
+/// it is an assumption.
+pub(super) fn widen_between(values: &mut [[f64; 2]], x: &[f64], measured: &[(f64, f64)]) {
+    for ([value, error], x) in values.iter_mut().zip(x) {
+        let above = measured.partition_point(|(closest, _)| closest <= x);
+        let at = |k: usize| measured.get(k).map_or(0.0, |(_, value)| *value);
+        let (one, other) = (at(above.saturating_sub(1)), at(above));
+        let (low, high) = (one.min(other), one.max(other));
+        let bias = if above == measured.len() {
+            value.abs()
+        } else {
+            (*value - value.clamp(low, high)).abs() + (high - low) / 12f64.sqrt()
+        };
+        *error = error.hypot(bias);
+    }
+}
+
 /// Adds the bias to the variances of the force: its largest curvature near a node times 3/4 of the
 /// variance of a uniform average that is as wide as the node's own, or as a gap between the sorted
 /// closest approaches. Beyond the last of them the force is an assumption, and its bias the force.

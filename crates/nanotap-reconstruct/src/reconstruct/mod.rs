@@ -251,15 +251,15 @@ impl Prepared {
             Some(amount) => length_of(case, amount).map_err(|e| e.at(option)).map(Some),
         };
         let level = readings.free_level();
-        let given = length("free_amplitude", &options.free_amplitude)?;
-        if level.is_none() && (given.is_none() || options.free_phase.is_none()) {
+        let given_amplitude = length("free_amplitude", &options.free_amplitude)?;
+        if level.is_none() && (given_amplitude.is_none() || options.free_phase.is_none()) {
             remarks.push(
                 "no rows are far from the sample: the free amplitude and phase are those of the \
                  case where they are not given"
                     .to_owned(),
             );
         }
-        let amplitude = given
+        let amplitude = given_amplitude
             .or(level.map(|level| level.amplitude))
             .unwrap_or(lever.free_amplitude);
         let phase = options
@@ -299,7 +299,10 @@ impl Prepared {
             gains,
             has_damping: true,
             free: [amplitude, phase],
-            free_rows: level.map_or(0, |level| level.rows),
+            free_rows: match (given_amplitude, options.free_phase) {
+                (Some(_), Some(_)) => 0,
+                _ => level.map_or(0, |level| level.rows),
+            },
             errors,
             widest: if physical {
                 WIDEST[0]
@@ -496,17 +499,30 @@ impl Prepared {
         let factor = std::f64::consts::PI * amplitude * amplitude;
         let count = nodes.0.len();
         let first = nodes.0.partition_point(|x| *x < inverted.low);
-        let dissipated: Vec<[f64; 2]> = nodes.0[first..]
-            .iter()
-            .map(|x| {
-                let weights = nodes.average(Kernel::Damping, *x, amplitude);
-                damping.sum(&weights).map(|value| factor * value)
-            })
-            .collect();
         let coefficient =
             |of: &smooth::Smooth, k: usize| of.coefficients.get(k).copied().unwrap_or(0.0);
         let error = |of: &smooth::Smooth, k: usize| if k + 1 < count { of.error(k) } else { 0.0 };
         let unit = 1.0 / self.angular_frequency;
+        let x = &nodes.0[first..];
+        let mut closest: Vec<f64> = inverted.rows.iter().map(|row| row.closest).collect();
+        closest.sort_by(f64::total_cmp);
+        let widened = |mut values: Vec<[f64; 2]>, at: &dyn Fn(f64) -> f64| {
+            let rows: Vec<(f64, f64)> = closest.iter().map(|x| (*x, at(*x))).collect();
+            bias::widen_between(&mut values, x, &rows);
+            values
+        };
+        let dissipation = |x: f64| {
+            let weights = nodes.average(Kernel::Damping, x, amplitude);
+            damping.sum(&weights).map(|value| factor * value)
+        };
+        let dissipated = widened(x.iter().map(|x| dissipation(*x)).collect(), &|x| {
+            dissipation(x)[0]
+        });
+        let coefficients = (first..count)
+            .map(|k| [coefficient(damping, k), error(damping, k)].map(|value| unit * value));
+        let damped = widened(coefficients.collect(), &|x| {
+            unit * nodes.value(&damping.coefficients, x)
+        });
         // A quantity that was not measured has no values.
         let measured = |values: Vec<f64>| -> Vec<Option<f64>> {
             let values = values.into_iter();
@@ -516,13 +532,13 @@ impl Prepared {
         };
         let along = |of: &dyn Fn(usize) -> f64| -> Vec<f64> { (first..count).map(of).collect() };
         ForceCurve {
-            distance: nodes.0[first..].to_vec(),
+            distance: x.to_vec(),
             force: along(&|k| coefficient(force, k)),
             force_error: along(&|k| error(force, k)),
             dissipation: measured(dissipated.iter().map(|pair| pair[0]).collect()),
             dissipation_error: measured(dissipated.iter().map(|pair| pair[1]).collect()),
-            damping: measured(along(&|k| unit * coefficient(damping, k))),
-            damping_error: measured(along(&|k| unit * error(damping, k))),
+            damping: measured(damped.iter().map(|pair| pair[0]).collect()),
+            damping_error: measured(damped.iter().map(|pair| pair[1]).collect()),
         }
     }
 

@@ -210,7 +210,7 @@ impl ReconstructReport {
                 "closest approach",
                 Some(shown(Kind::Length, self.closest, 4)),
             ),
-            ("largest dissipation", Some(dissipation)),
+            ("largest dissipation of a row", Some(dissipation)),
             (
                 "free amplitude and phase",
                 Some(format!(

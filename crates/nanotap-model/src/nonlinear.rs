@@ -97,6 +97,16 @@ impl Nonlinear {
         let response = free.project(height);
         let swing: f64 = response.tones.iter().map(|z| z.modulus()).sum();
         let size = swing.max(height.constant.abs());
+        // Nearer, a force may have a wall, which not every motion reaches.
+        let away = height.constant.abs() + swing;
+        let force = law.value(law.branch_at(away, 0.0), away, 0.0);
+        if !force.is_finite() {
+            return Err(ModelError::Nonlinear(VolterraError::Value {
+                what: "the force on the tip farthest from the sample".into(),
+                found: force,
+                needed: "finite",
+            }));
+        }
         let tolerance = TOLERANCE * if size > 0.0 { size } else { 1.0 };
         let forcing = Drive {
             constant: free.forcing().constant.clone(),
@@ -422,6 +432,13 @@ impl Nonlinear {
                     } else {
                         b = middle;
                     }
+                }
+                // At a pole of the force the sign changes, too, but there the excess grows.
+                let finite = [fa, fb].into_iter().filter(|value| value.is_finite());
+                let scale = finite.fold(0.0, |most: f64, value| most.max(value.abs()));
+                let left = excess(b).abs();
+                if left.is_nan() || left > scale {
+                    continue;
                 }
                 let force = law.force(branch, b, 0.0);
                 found.push(Equilibrium {

@@ -77,6 +77,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     };
     write_out(arguments, &case)?;
     let solved = setpoint_solved.as_ref().map_or_else(String::new, setpoint);
+    // A case without a model is no case, though its numbers could be shown.
+    case.model()?;
     let document = SolvedCase::of(&case, setpoint_solved);
     if let Some(numbers) = case.cantilever() {
         remarks(&case, output);

@@ -462,6 +462,24 @@ impl Case {
                 )),
             };
         }
+        if self.is_physical() {
+            let varies = |key: &Key| key.is_physical() && key.cannot_vary().is_none();
+            let same = Key::all().filter(|key| varies(key) && key.name() == plain);
+            let same: Vec<String> = same.map(|key| format!("`{key}`")).collect();
+            if !same.is_empty() {
+                return Err(NoSuchKey::Unknown {
+                    given: plain.to_owned(),
+                    hint: format!("did you mean {}?", same.join(" or ")),
+                });
+            }
+            if near_name(plain, keys.iter().map(|key| key.path())).is_none() {
+                return Err(NoSuchKey::Unknown {
+                    given: plain.to_owned(),
+                    hint: "name a quantity of the case file as section.key, as in drive.frequency"
+                        .to_owned(),
+                });
+            }
+        }
         Err(NoSuchKey::unknown(plain, &keys))
     }
 
@@ -808,7 +826,7 @@ impl Case {
             Kind::Length if !key.is_physical() => Section::Gap,
             _ => key.section(),
         };
-        match plausible::meant(section, kind, value) {
+        match plausible::meant(key, section, kind, value) {
             Some(meant) if text.trim().parse::<f64>().is_ok() => {
                 Err(ValueOfKeyError::Implausible {
                     text: text.to_owned(),

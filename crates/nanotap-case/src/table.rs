@@ -282,6 +282,11 @@ impl Table {
                 column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
             }
         }
+        // A separator at the end of each line makes a column without name and content.
+        let is_empty = |(header, column): &mut (String, Vec<Entry>)| {
+            header.is_empty() && column.iter().all(|entry| *entry == Entry::Missing)
+        };
+        while table.columns.len() > 1 && table.columns.pop_if(is_empty).is_some() {}
         Ok(table)
     }
 
@@ -652,6 +657,16 @@ mod tests {
         assert_eq!(table.columns[0].0, "way");
         let error = Table::parse("t", "Operator;Max\nz;d\n1;2\n3\n4;5\n").unwrap_err();
         assert!(error.message().contains("line 4"), "{}", error.message());
+    }
+
+    #[test]
+    fn separators_at_the_end_of_lines_make_no_column() {
+        let table = Table::parse("t", "z,d,\n1,2,\n3,4,\n").unwrap();
+        assert_eq!(table.columns.len(), 2);
+        assert_eq!(table.columns[1].1, [Entry::Number(2.0), Entry::Number(4.0)]);
+        // With content it is a column, whose name is missing.
+        let table = Table::parse("t", "z,d,\n1,2,5\n3,4,\n").unwrap();
+        assert_eq!(table.columns.len(), 3);
     }
 
     #[test]

@@ -132,7 +132,7 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         let Some(key) = key else {
             problems.add(|| match section {
                 Section::Model => refusal::unknown_model_key(kind, entry),
-                _ => refusal::unknown_physical_key(section, entry),
+                _ => refusal::unknown_physical_key(section, entry, document),
             });
             continue;
         };

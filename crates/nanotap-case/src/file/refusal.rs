@@ -7,6 +7,7 @@ use super::problem::{Place, Problem, Problems};
 use crate::key::{Key, ModelKind, Section};
 use crate::near_name::near_name;
 use crate::stated::quoted;
+use nanotap_formula::Formula;
 use nanotap_model::contact::ContactLaw;
 
 /// Refuses keys outside tables, and unknown tables.
@@ -116,13 +117,30 @@ pub(super) fn unknown_model_key(kind: ModelKind, entry: &Entry) -> Problem {
     problem.help(format!("the keys are {}", names.join(", ")))
 }
 
-pub(super) fn unknown_physical_key(section: Section, entry: &Entry) -> Problem {
+/// Whether the formula of the sample's force has a parameter of this name.
+fn is_in_formula(name: &str, document: &Document) -> bool {
+    let force = document.entries.iter().rev().find(|entry| {
+        entry.table == Section::Sample.name() && entry.key == Key::SampleForce.name()
+    });
+    let formula = force.and_then(|entry| Formula::parse(&entry.text()?).ok());
+    formula.is_some_and(|formula| formula.parameters().iter().any(|own| own == name))
+}
+
+pub(super) fn unknown_physical_key(
+    section: Section,
+    entry: &Entry,
+    document: &Document,
+) -> Problem {
     let (table, key) = (section.name(), &entry.key);
     let problem = Problem::new(
         entry.key_place.clone(),
         format!("`{key}` (= {}) is not a key of [{table}]", entry.written),
     );
     let names: Vec<&str> = section.keys().map(Key::name).collect();
+    if section == Section::Sample && is_in_formula(key, document) {
+        return problem
+            .help("write it below [sample.parameters]: it is a parameter of the formula");
+    }
     if let Some(table) = tables_of(key).find(|table| *table != Section::Model) {
         return problem.help(format!("it is a key of [{}]", table.name()));
     }

@@ -1,7 +1,7 @@
 //! Values that no lever, tip, sample or drive has: most likely numbers without their unit, or with
 //! another prefix.
 
-use super::Section;
+use super::{Key, Section};
 use crate::quantity::Kind;
 
 /// Quantities by section, their values in SI on real instruments, and the unit in which they are
@@ -16,13 +16,17 @@ const PLAUSIBLE: [(Section, Kind, [f64; 2], &str); 12] = [
     (Section::Sample, Kind::Length, [0.0, 0.1], "nm"),
     (Section::Sample, Kind::SurfaceEnergy, [0.0, 10.0], "mJ/m^2"),
     (Section::Sample, Kind::Energy, [0.0, 1e-15], "zJ"),
-    (Section::Drive, Kind::Frequency, [1.0, 1e9], "kHz"),
+    (Section::Drive, Kind::Frequency, [200.0, 1e9], "kHz"),
     (Section::Drive, Kind::Length, [0.0, 1e-3], "nm"),
     (Section::Gap, Kind::Length, [0.0, 1e-3], "nm"),
 ];
 
-/// What was meant by a value in SI that no instrument has, such as `11 nm`; `None` if one may have it.
-pub(crate) fn meant(section: Section, kind: Kind, value: f64) -> Option<String> {
+/// What was meant by a value in SI of a key that no instrument has, such as `11 nm`; `None` if one may have
+/// it. A setpoint may be a shift of a fraction of a hertz.
+pub(crate) fn meant(key: Key, section: Section, kind: Kind, value: f64) -> Option<String> {
+    if key == Key::DriveSetpoint {
+        return None;
+    }
     let mut rows = PLAUSIBLE.iter();
     let (.., [low, high], unit) =
         rows.find(|(of, quantity, ..)| *of == section && *quantity == kind)?;

@@ -97,14 +97,22 @@ pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
     }
 }
 
-/// The nonlinear laws with a key, in brackets; empty if there are none.
-fn laws_with(key: Key) -> String {
+/// The nonlinear laws with a key.
+fn laws_with(key: Key) -> Vec<&'static str> {
     let with = |law: &&'static TableLaw| takes(std::slice::from_ref(law), key);
-    let names: Vec<&str> = laws::all().filter(with).map(|law| law.entry.name).collect();
-    if names.is_empty() {
-        return String::new();
+    laws::all().filter(with).map(|law| law.entry.name).collect()
+}
+
+/// Why a key has no effect under a linear law.
+fn belongs_to(key: Key) -> String {
+    match &laws_with(key)[..] {
+        [] => "it belongs to a nonlinear force law".to_owned(),
+        [law] => format!("it belongs to sample.law = \"{law}\""),
+        laws => format!(
+            "it belongs to a nonlinear force law (laws with it: {})",
+            laws.join(", ")
+        ),
     }
-    format!(" (laws with it: {})", names.join(", "))
 }
 
 /// The key that states a parameter of a law.
@@ -196,7 +204,7 @@ impl SampleForce {
                     let law = ContactLaw::GeneralisedMaxwell;
                     format!("it belongs to sample.law = \"{law}\"")
                 } else {
-                    format!("it belongs to a nonlinear force law{}", laws_with(key))
+                    belongs_to(key)
                 };
                 Err(reader.impossible(key, reason))
             });
@@ -217,10 +225,13 @@ impl SampleForce {
                     keys.push(key);
                 }
             }
+            let others = match &laws_with(key)[..] {
+                [] => String::new(),
+                laws => format!(" (laws with it: {})", laws.join(", ")),
+            };
             let reason = format!(
-                "it is not a parameter of sample.law = \"{name}\", which takes {}{}",
-                keys.join(", "),
-                laws_with(key)
+                "it is not a parameter of sample.law = \"{name}\", which takes {}{others}",
+                keys.join(", ")
             );
             return Err(reader.impossible(key, reason));
         }

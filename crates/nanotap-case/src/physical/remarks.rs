@@ -88,7 +88,7 @@ impl Physical {
             let Value::Number(value, kind) = reader.stated.get(key)? else {
                 return None;
             };
-            let meant = plausible::meant(key.section(), *kind, *value)?;
+            let meant = plausible::meant(key, key.section(), *kind, *value)?;
             let shown = kind.format(*value);
             Some(Remark::warning(format!(
                 "{key} is {shown}; did you mean {meant}?"

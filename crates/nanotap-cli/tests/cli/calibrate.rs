@@ -280,3 +280,29 @@ fn the_document_has_the_entries_of_its_schema() {
         assert!(document.get(name.as_str().unwrap()).is_some(), "{name}");
     }
 }
+
+/// An option that has no effect on what is read is refused, and another unit than the stated one is noted.
+#[test]
+fn options_without_effect_are_refused() {
+    let folder = Folder::new();
+    folder.write(
+        "psd.csv",
+        table("frequency (kHz),PSD (pm^2/Hz)", |f| 1e24 * density(f)),
+    );
+    for (option, value, words) in [
+        ("--segment", "256", "is for a record of the deflection"),
+        (
+            "--spectrum",
+            "1",
+            "names a spectrum of an instrument's file",
+        ),
+    ] {
+        folder
+            .run(&["calibrate", "psd.csv", option, value])
+            .refused(&[option, "has no effect on `PSD`", words]);
+    }
+    let found = folder.run(&["calibrate", "psd.csv", "--unit", "fm^2/Hz", "--json"]);
+    let notes = found.json()["notes"].to_string();
+    assert!(notes.contains("its own unit is"), "{notes}");
+    close(&found.json()["stiffness"]["value"], 2.8e6, 1e-5);
+}

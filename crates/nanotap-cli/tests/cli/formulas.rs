@@ -48,7 +48,20 @@ fn mistakes_are_refused_with_their_place() {
         refused.refused(&[words]);
         assert!(refused.stderr.contains("bad.toml"), "{}", refused.stderr);
     }
+    folder.write("infinite.toml", case("k*d/0", "k = \"5 N/m\""));
+    for command in ["case", "orbit"] {
+        let refused = folder.run(&[command, "infinite.toml"]);
+        refused.refused(&["the force on the tip farthest from the sample must be finite"]);
+    }
+    let misplaced = case(SPRING, "").replace("[sample.parameters]", "k = \"5 N/m\"");
+    folder.write("misplaced.toml", misplaced);
+    folder
+        .run(&["case", "misplaced.toml"])
+        .refused(&["`k` (= \"5 N/m\")", "write it below [sample.parameters]"]);
     folder.write("good.toml", case(SPRING, "k = \"5 N/m\""));
+    folder
+        .run(&["case", "good.toml", "--set", "sample.law="])
+        .refused(&["it belongs to sample.law = \"formula\""]);
     folder
         .run(&["orbit", "good.toml", "--set", "sample.force="])
         .refused(&["sample.force is missing", "needs its formula"]);
@@ -66,6 +79,19 @@ fn mistakes_are_refused_with_their_place() {
     folder
         .run(&["sweep", "good.toml", "--over", "sample.parameters.q=1:2:3"])
         .refused(&["sample.parameters.q"]);
+}
+
+/// A repulsion without limit has a pole at which its sign changes; no lever rests there.
+#[test]
+fn no_lever_rests_at_a_pole() {
+    let folder = Folder::new();
+    folder.write("pole.toml", case("F0*a/d", "F0 = \"1 nN\"\na = \"1 nm\""));
+    let rests = folder.run(&["case", "pole.toml", "--json"]).json()["equilibria"].clone();
+    let rests = rests.as_array().unwrap();
+    assert_eq!(rests.len(), 1, "{rests:?}");
+    // k (d − 16 nm) = F0 a/d, of the modal static stiffness; in front of the sample.
+    assert_eq!(rests[0]["contact"], false);
+    assert_eq!(rests[0]["stable"], true);
 }
 
 /// What was written is read back as the same case, and parameters vary like any quantity.

@@ -97,7 +97,7 @@ options! {
         /// Column of a table with the density or the deflection; default: the first with such a unit
         #[schemars(extend("x-value" = "NAME"))]
         pub column: Option<String> = None,
-        /// Unit of the density, as in "pm^2/Hz" or "V/sqrt(Hz)", or of the deflection, where the file states none
+        /// Unit of the density, as in "pm^2/Hz" or "V/sqrt(Hz)", or of the deflection; default: as the file states
         #[schemars(extend("x-value" = "UNIT"))]
         pub unit: Option<String> = None,
         /// Sampling rate of a record without times, as in "1 MHz"
@@ -345,11 +345,13 @@ fn calibrate(
     source: String,
     options: &CalibrateOptions,
 ) -> Result<CalibrateReport, Error> {
+    measurement.refuse_without_effect(options)?;
     let Measurement {
         signal,
         name,
         stated,
         mut notes,
+        ..
     } = measurement;
     let spectrum = spectrum(signal, &stated, options)?;
     let settings = settings(&spectrum, &stated, options, &mut notes)?;

@@ -6,8 +6,8 @@ use nanotap_case::table::{Entry, Header, Table};
 use nanotap_error::Error;
 use nanotap_quantity::{Kind, Quantity};
 
-use super::CalibrateOptions;
 use super::unit::{DensityUnit, signal};
+use super::{AverageKind, CalibrateOptions};
 
 /// Zero of the Celsius scale, K.
 pub(super) const CELSIUS: f64 = 273.15;
@@ -55,6 +55,84 @@ pub(super) struct Measurement {
     pub(super) stated: Stated,
     /// What was read, and from where.
     pub(super) notes: Vec<String>,
+    /// Whether it is a table, not an instrument's file.
+    pub(super) is_table: bool,
+}
+
+impl Measurement {
+    /// Refuses options that have no effect on such a measurement.
+    pub(super) fn refuse_without_effect(&self, options: &CalibrateOptions) -> Result<(), Error> {
+        let is_spectrum = matches!(self.signal, Signal::Spectrum { .. });
+        let (table, file) = (self.is_table, !self.is_table);
+        let rows = [
+            (
+                "spectrum",
+                options.spectrum.is_some() && !(file && is_spectrum),
+                "names a spectrum of an instrument's file",
+            ),
+            (
+                "column",
+                options.column.is_some() && file,
+                "names a column of a table",
+            ),
+            (
+                "unit",
+                options.unit.is_some() && file && !is_spectrum,
+                "is that of a table or of a spectrum; this record states its own",
+            ),
+            (
+                "rate",
+                options.rate.is_some() && !(table && !is_spectrum),
+                "is that of deflections in a table",
+            ),
+            (
+                "segment",
+                options.segment.is_some() && is_spectrum,
+                "is for a record of the deflection; this is a spectrum",
+            ),
+            (
+                "averages",
+                options.averages.is_some() && !is_spectrum,
+                "is for a spectrum; those of a record follow from its segments",
+            ),
+            (
+                "average",
+                options.average != AverageKind::Auto && !is_spectrum,
+                "is for a spectrum; of a record powers are averaged",
+            ),
+            (
+                "two_sided",
+                options.two_sided && !is_spectrum,
+                "is for a spectrum; that of a record is one-sided",
+            ),
+        ];
+        match rows.into_iter().find(|(_, is_useless, _)| *is_useless) {
+            Some((name, _, reason)) => Err(Error::option(
+                name,
+                format!("{{{name}}} has no effect on `{}`: it {reason}", self.name),
+                "leave it out",
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The unit that an option gives, or the stated one; a note if they differ.
+fn unit_of<'a>(
+    name: &str,
+    stated: &'a str,
+    options: &'a CalibrateOptions,
+    notes: &mut Vec<String>,
+) -> &'a str {
+    let Some(given) = options.unit.as_deref() else {
+        return stated;
+    };
+    if !stated.is_empty() && given != stated {
+        notes.push(format!(
+            "`{name}` is read in \"{given}\", as the options say; its own unit is \"{stated}\""
+        ));
+    }
+    given
 }
 
 /// Reads the content of an instrument's file, or of a table as text.
@@ -100,9 +178,9 @@ fn of_spectra(document: &Document, options: &CalibrateOptions) -> Result<Measure
         }
         None => named("average").unwrap_or(&document.spectra[0]),
     };
-    let text = options.unit.as_deref().unwrap_or(&spectrum.unit);
-    let unit = DensityUnit::read(text).ok_or_else(|| no_density(&spectrum.name, text))?;
     let mut notes = Vec::new();
+    let text = unit_of(&spectrum.name, &spectrum.unit, options, &mut notes);
+    let unit = DensityUnit::read(text).ok_or_else(|| no_density(&spectrum.name, text))?;
     let stated = stated(document, &mut notes);
     Ok(Measurement {
         signal: Signal::Spectrum {
@@ -114,6 +192,7 @@ fn of_spectra(document: &Document, options: &CalibrateOptions) -> Result<Measure
         name: spectrum.name.clone(),
         stated,
         notes,
+        is_table: false,
     })
 }
 
@@ -226,6 +305,7 @@ fn record(curve: &Curve, segment: &Segment, rate: f64) -> Result<Measurement, St
             ..Stated::default()
         },
         notes,
+        is_table: false,
     })
 }
 
@@ -249,7 +329,7 @@ pub(super) fn of_table(table: &Table, options: &CalibrateOptions) -> Result<Meas
     let frequency = abscissa(Kind::Frequency, &["freq", "f ("]);
     let time = abscissa(Kind::Time, &["time"]);
     let remarks = table.remarks.iter().cloned();
-    let notes: Vec<String> = remarks.collect();
+    let mut notes: Vec<String> = remarks.collect();
     let wanted = |default: Option<usize>, what: &str| {
         let requested = options.column.as_deref().map(|name| {
             let is_called = |(header, _): &(String, Vec<Entry>)| Header::is_called(header, name);
@@ -281,9 +361,9 @@ pub(super) fn of_table(table: &Table, options: &CalibrateOptions) -> Result<Meas
         let default = headers.iter().position(is_density);
         let default = default.or_else(|| options.unit.as_ref().and_then(|_| other()));
         let column = wanted(default, "a spectral density")?;
-        let text = options.unit.as_deref().unwrap_or(&headers[column].unit);
-        let unit =
-            DensityUnit::read(text).ok_or_else(|| no_density(&headers[column].name, text))?;
+        let Header { name, unit } = &headers[column];
+        let text = unit_of(name, unit, options, &mut notes);
+        let unit = DensityUnit::read(text).ok_or_else(|| no_density(name, text))?;
         let factor = Kind::Frequency.parse(&format!("1 {}", headers[frequency].unit));
         let factor = factor.unwrap_or(1.0);
         let rows = rows(table, &[frequency, column])?;
@@ -297,6 +377,7 @@ pub(super) fn of_table(table: &Table, options: &CalibrateOptions) -> Result<Meas
             name: headers[column].name.clone(),
             stated: Stated::default(),
             notes,
+            is_table: true,
         });
     }
     let is_signal = |header: &Header| signal(&header.unit).is_some();
@@ -304,11 +385,12 @@ pub(super) fn of_table(table: &Table, options: &CalibrateOptions) -> Result<Meas
         headers.iter().position(is_signal),
         "frequencies and spectral densities, or deflections in m or V",
     )?;
-    let text = options.unit.as_deref().unwrap_or(&headers[column].unit);
+    let Header { name, unit } = &headers[column];
+    let text = unit_of(name, unit, options, &mut notes);
     let (unit, factor) = signal(text).ok_or_else(|| {
         Error::option(
             "unit",
-            format!("`{}` has the unit \"{text}\"", headers[column].name),
+            format!("`{name}` has the unit \"{text}\""),
             "expected a unit of the deflection such as \"nm\" or \"V\"",
         )
     })?;
@@ -347,6 +429,7 @@ pub(super) fn of_table(table: &Table, options: &CalibrateOptions) -> Result<Meas
         name: headers[column].name.clone(),
         stated: Stated::default(),
         notes,
+        is_table: true,
     })
 }
 

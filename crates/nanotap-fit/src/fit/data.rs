@@ -640,10 +640,7 @@ fn unit_of(header: &Header, quantity: Quantity, case: &Case) -> Result<f64, Erro
     match (quantity.is_angle(), kind, header.unit.as_str()) {
         (true, _, "" | "deg" | "°" | "degree" | "degrees") | (_, None, "" | "1") => Ok(1.0),
         (true, _, "rad") => Ok(1f64.to_degrees()),
-        (_, Some(kind), "") => Err(Error::input(
-            format!("it has no unit, and {} needs one", kind.noun()),
-            format!("name it as in `{} ({})`", header.name, kind.si_unit()),
-        )),
+        (_, Some(kind), "") => Err(without_unit(header, kind)),
         (_, Some(kind), unit) => kind
             .parse(&format!("1 {unit}"))
             .map_err(|error| Error::input(error.to_string(), "change the unit in brackets")),
@@ -659,8 +656,28 @@ fn unit_of(header: &Header, quantity: Quantity, case: &Case) -> Result<f64, Erro
     }
 }
 
+fn without_unit(header: &Header, kind: Kind) -> Error {
+    let unit = match kind {
+        Kind::Length => "nm",
+        kind => kind.si_unit(),
+    };
+    Error::input(
+        format!("it has no unit, and {} needs one", kind.noun()),
+        format!("name it as in `{} ({unit})`", header.name),
+    )
+}
+
 fn unit_of_key(header: &Header, key: Key, case: &Case) -> Result<f64, Error> {
-    let text = format!("1 {}", header.unit);
+    let kind = match key.kind() {
+        kind if !case.is_physical() || kind == Kind::Number => None,
+        kind => Some(kind),
+    };
+    let unit = match (header.unit.as_str(), kind) {
+        ("", Some(Kind::Length)) => return Err(without_unit(header, Kind::Length)),
+        ("", Some(kind)) => kind.si_unit(),
+        (unit, _) => unit,
+    };
+    let text = format!("1 {unit}");
     case.value(key, text.trim())
         .map_err(|error| Error::from(error).remedy("name it as in `distance (nm)`"))
 }

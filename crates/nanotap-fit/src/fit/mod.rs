@@ -110,8 +110,8 @@ options! {
         pub data: Vec<Table> = Vec::new(),
         /// Parameters to find: keys of the case, gap.offset, NAME.offset or NAME.scale of a column, and
         /// terms of the instrument: NAME.tilt, NAME.curvature, NAME.interference, NAME.drag, gap.drift,
-        /// gap.backlash; of a force curve without other names than these terms, too: modulus, contact point,
-        /// baseline, and the adhesion of the law
+        /// gap.backlash. Of a force curve for which no key is named, the sample's modulus, the contact point, the
+        /// baseline and the adhesion of the law are found
         #[schemars(extend("x-value" = "KEY,…"))]
         pub free: Vec<String> = Vec::new(),
         /// Parameters to find with one value per curve

@@ -35,6 +35,24 @@ pub enum StoreError {
         /// The differences, one per key, as `key: there, here`.
         differences: Vec<String>,
     },
+    /// Two stores that are not shares of one dataset.
+    #[error(
+        "{} and {} are not shares of one dataset: {}",
+        first.display(),
+        path.display(),
+        differences.join("; ")
+    )]
+    Foreign {
+        /// Path of the first store.
+        first: PathBuf,
+        /// Path of the other store.
+        path: PathBuf,
+        /// The differences, one per key, as `key: there, here`, the first store being here.
+        differences: Vec<String>,
+    },
+    /// There is no dataset to merge.
+    #[error("there is no dataset to merge")]
+    Nothing,
     /// A dataset is needed completely, but some of its chunks are missing.
     #[error(
         "{}: {missing} of {total} chunks are missing; run the same command again to finish it",
@@ -109,6 +127,10 @@ impl From<StoreError> for nanotap_error::Error {
             StoreError::Mismatch { .. } => {
                 input("name another folder with {out}, or remove what is there")
             }
+            StoreError::Foreign { .. } => {
+                input("merge what one command wrote of one case with the same options")
+            }
+            StoreError::Nothing => input("name the datasets of the shares"),
             StoreError::Io { .. } => Self::files(error.to_string()),
             StoreError::Unfinished { .. } | StoreError::Damaged { .. } => {
                 Self::numerics(error.to_string())

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
 use super::schema::Schema;
-use super::store::{Store, mismatch, same};
+use super::store::{Store, metadata_differences, same};
 
 /// Result of merging partial datasets into one store.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
@@ -40,7 +40,11 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         for other in others {
             let divided = (is_whole(first) || is_whole(other)) && alike(first, other);
             if !divided && !same(other.metadata(), first.metadata()) {
-                return Err(mismatch(other.path(), other.metadata(), first.metadata()));
+                return Err(StoreError::Foreign {
+                    first: first.path().into(),
+                    path: other.path().into(),
+                    differences: metadata_differences(other.metadata(), first.metadata()),
+                });
             }
         }
     }
@@ -49,11 +53,7 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         stores = vec![stores.swap_remove(whole)];
     }
     let Some(first) = stores.first() else {
-        let what = "no dataset to merge".into();
-        return Err(StoreError::NotAStore {
-            path: target.into(),
-            what,
-        });
+        return Err(StoreError::Nothing);
     };
     let merged = if first.is_packed() {
         Store::beside(target, first.schema().clone(), true)

@@ -806,6 +806,17 @@ fn rebuilt(path: &Path) -> Option<Value> {
 
 /// The error for a store with different metadata.
 pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
+    StoreError::Mismatch {
+        path: path.into(),
+        differences: metadata_differences(there, here),
+    }
+}
+
+/// Differences that an error lists.
+const LISTED: usize = 4;
+
+/// What differs between the metadata of two stores, in words.
+pub(super) fn metadata_differences(there: &str, here: &str) -> Vec<String> {
     let root = |text: &str| {
         let all: Value = serde_json::from_str(text).unwrap_or_default();
         all["metadata"][zarr::ATTRIBUTES].clone()
@@ -818,10 +829,12 @@ pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
     if differences.is_empty() {
         differences.push("its variables are those of another version".into());
     }
-    StoreError::Mismatch {
-        path: path.into(),
-        differences,
+    let more = differences.len().saturating_sub(LISTED);
+    differences.truncate(LISTED);
+    if more > 0 {
+        differences.push(format!("and {more} more"));
     }
+    differences
 }
 
 /// Largest number of entries of an array: larger ones were not written by nanotap.

@@ -341,7 +341,7 @@ fn arithmetics_are_not_mixed() {
         .replace("\"arithmetic\": \"", "\"arithmetic\": \"another-");
     folder.write("b.zarr/.zmetadata", other);
     let merge = folder.run(&["merge", "a.zarr", "b.zarr", "--out", "never.zarr"]);
-    merge.refused(&["belongs to another case", "arithmetic", "another-"]);
+    merge.refused(&["are not shares of one dataset", "arithmetic", "another-"]);
     let again = folder.run(&[&sweep[..], &["b.zarr"]].concat());
     again.refused(&["belongs to another case", "arithmetic", "another-"]);
 }

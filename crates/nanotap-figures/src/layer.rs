@@ -259,6 +259,30 @@ impl Band {
             ..Band::x(intervals)
         }
     }
+
+    /// Shades the pixels of a line for which `holds` is true, each `width` wide, the first from 0;
+    /// neighbours are one band. `None` if it holds for none.
+    ///
+    /// ```
+    /// use nanotap_figures::Band;
+    ///
+    /// let band = Band::of_pixels([true, true, false, true], 2.0).unwrap();
+    /// assert_eq!(band.intervals, [(0.0, 4.0), (6.0, 8.0)]);
+    /// ```
+    pub fn of_pixels(holds: impl IntoIterator<Item = bool>, width: f64) -> Option<Band> {
+        let mut intervals: Vec<(f64, f64)> = Vec::new();
+        let mut before = false;
+        for (k, holds) in holds.into_iter().enumerate() {
+            let (from, to) = (width * k as f64, width * (k + 1) as f64);
+            match intervals.last_mut() {
+                Some(last) if holds && before => last.1 = to,
+                _ if holds => intervals.push((from, to)),
+                _ => {}
+            }
+            before = holds;
+        }
+        (!intervals.is_empty()).then(|| Band::x(intervals))
+    }
 }
 
 /// A place in a panel.

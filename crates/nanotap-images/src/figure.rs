@@ -151,18 +151,19 @@ fn line_figure(report: &ImageStatesReport) -> Figure {
     let (factor, unit, low) = heights(report);
     let level = |height: f64| factor * (height - low);
     let states = images.state.first().map_or(&[][..], Vec::as_slice);
+    let band = |state: Option<usize>| Band::of_pixels(states.iter().map(|own| *own == state), step);
     if let (Some(height), Some(corrected)) = (&images.height, &images.corrected) {
         let mut panel = Panel::new(axis(), Axis::linear("height $z$").unit(unit));
         for (k, state) in report.states.iter().enumerate() {
-            let bands = bands(states, Some(k), step);
-            if !bands.is_empty() && report.reference.as_ref() != Some(&state.name) {
-                let band = Band::x(bands).colour(colour(&state.name));
+            if let Some(band) = band(Some(k))
+                && report.reference.as_ref() != Some(&state.name)
+            {
+                let band = band.colour(colour(&state.name));
                 panel = panel.with(band.label(state.name.as_str()));
             }
         }
-        let bands = bands(states, None, step);
-        if !bands.is_empty() {
-            panel = panel.with(Band::x(bands).label("undecided"));
+        if let Some(band) = band(None) {
+            panel = panel.with(band.label("undecided"));
         }
         let measured = Line::new(points(&height[0], &level)).colour(Colour::GREY);
         let corrected = Line::new(points(&corrected[0], &level)).colour(Colour::BLACK);
@@ -184,17 +185,4 @@ fn line_figure(report: &ImageStatesReport) -> Figure {
     let figure = Figure::new(panels.len(), 1).width(ONE_AND_A_HALF_COLUMNS);
     let figure = figure.height(45.0 + 45.0 * panels.len() as f64).share_x();
     panels.into_iter().fold(figure, Figure::with)
-}
-
-/// Stretches of pixels in a state.
-fn bands(states: &[Option<usize>], state: Option<usize>, step: f64) -> Vec<(f64, f64)> {
-    let mut bands: Vec<(f64, f64)> = Vec::new();
-    for (k, _) in states.iter().enumerate().filter(|(_, own)| **own == state) {
-        let (from, to) = (step * k as f64, step * (k + 1) as f64);
-        match bands.last_mut() {
-            Some(last) if (last.1 - from).abs() < 0.5 * step => last.1 = to,
-            _ => bands.push((from, to)),
-        }
-    }
-    bands
 }

@@ -61,9 +61,11 @@ fn line_figure(report: &ScanReport) -> Figure {
             panel = panel.with(Rule::vertical(factor * change.x));
         }
         if k == 0 {
-            let bands = bands(report, factor, Interaction::Attractive);
-            if !bands.is_empty() {
-                panel = panel.with(Band::x(bands).label("attractive state"));
+            let states = &report.trace.state[0];
+            let width = factor * report.size[0] / states.len().max(1) as f64;
+            let attractive = states.iter().map(|s| *s == Some(Interaction::Attractive));
+            if let Some(band) = Band::of_pixels(attractive, width) {
+                panel = panel.with(band.label("attractive state"));
             }
             let level = surface_level(report);
             let surface: Vec<f64> = report.trace.surface[0].iter().map(|h| h + level).collect();
@@ -98,25 +100,6 @@ fn surface_level(report: &ScanReport) -> f64 {
     apart.retain(|value| value.is_finite());
     apart.sort_by(f64::total_cmp);
     apart.get(apart.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// Stretches of the trace in a state.
-fn bands(report: &ScanReport, factor: f64, state: Interaction) -> Vec<(f64, f64)> {
-    let states = &report.trace.state[0];
-    let step = factor * report.size[0] / states.len().max(1) as f64;
-    let mut bands: Vec<(f64, f64)> = Vec::new();
-    for (k, _) in states
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| **s == Some(state))
-    {
-        let (from, to) = (step * k as f64, step * (k + 1) as f64);
-        match bands.last_mut() {
-            Some(last) if (last.1 - from).abs() < 0.5 * step => last.1 = to,
-            _ => bands.push((from, to)),
-        }
-    }
-    bands
 }
 
 fn image_figure(report: &ScanReport) -> Figure {

@@ -1556,7 +1556,7 @@ def test_levers_are_compared_and_a_click_takes_one(page: Any, address: str) -> N
     page.locator("#tables .choice").nth(k).click()
     until(page, lambda: rows[k][0].replace(" ", "+") in page.url)
     until(page, lambda: read(page, "regime") == rows[k][heads.index("regime")])
-    shown, listed = read(page, "peak_force"), rows[k][heads.index("peak force")]
+    shown, listed = read(page, "peak_force"), rows[k][heads.index("F_max")]
     assert float(shown.split()[0]) == pytest.approx(float(listed.split()[0]), rel=0.01)
     assert page.is_hidden("#stale")
     assert page.is_hidden("#message")
@@ -1605,14 +1605,14 @@ def test_a_study_of_the_registry_is_computed_on_the_page(
 
 @pytest.mark.alone
 def test_a_trial_tells_how_long_a_study_takes(address: str) -> None:
-    def told(points: int) -> tuple[float, str]:
+    def estimated(points: int) -> tuple[float, str]:
         over = f"omega=2.9:3.1:{points},alpha4=18:22:20"
         options = {"over": over, "starts": "16"}
         (answer,) = studied(address, tab="window", options=options, estimate=True)
         return answer["estimate"], answer["command"]
 
     begun = time.monotonic()
-    least, _ = told(20)
+    least, _ = estimated(20)
     options = {"over": "omega=2.9:3.1:20,alpha4=18:22:20", "starts": "16"}
     trial = time.monotonic() - begun
     (*_, last) = studied(address, tab="window", options=options)
@@ -1620,7 +1620,7 @@ def test_a_trial_tells_how_long_a_study_takes(address: str) -> None:
     assert trial < 6
     # The machine may be busy with other things during one of the two.
     assert least / 10 < took < 10 * least + 2
-    most, command = told(4000)
+    most, command = estimated(4000)
     assert most > 20 * least
     assert command == last["command"].replace("2.9:3.1:20", "2.9:3.1:4000")
 

@@ -64,7 +64,7 @@ def test_a_pulse_has_the_numbers_of_the_terminal(
     document = printed(tmp_path, *words)
     first = next(text for name, text in found.items() if name.startswith(FIRST))
     assert number(first) == pytest.approx(document["first_contact"], rel=3e-5)
-    # As docs/cases/one-shot.md has it, there with SciPy's digits beside it.
+    # As docs/cases/one-shot.md has it, together with SciPy's digits.
     assert number(first) == pytest.approx(1.70382362, rel=3e-5)
     si = document["physical"]
     assert number(found["largest tip deflection W"]) == pytest.approx(

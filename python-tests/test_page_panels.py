@@ -297,7 +297,7 @@ def test_a_slider_is_dragged_for_long(page: Any, address: str, tmp_path: Path) -
         page.mouse.move(at(part), y)
         page.wait_for_timeout(30)
         if k % 150 == 149:
-            # The slider is held, and not let go.
+            # The slider is still held.
             page.wait_for_selector("body[data-rows=done]")
             paused[page.input_value("#setpoint")] = page.evaluate(read)
         if before is None and time.monotonic() - begun > DRAGGED / 4:

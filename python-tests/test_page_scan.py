@@ -47,7 +47,7 @@ def exact(page: Any) -> dict[str, Any]:
     return page.evaluate("document.getElementById('strips').line")
 
 
-def told(page: Any) -> str:
+def sentence(page: Any) -> str:
     return page.inner_text("#scan-say")
 
 
@@ -105,7 +105,7 @@ def test_the_sentence_of_the_patch_names_the_change_of_state(
     shown(page, address, "view=scan&preset=patch")
     report = terminal(case_file(address, {"preset": "patch"}), tmp_path)
     (change,) = report["branch_changes"]
-    words = told(page)
+    words = sentence(page)
     assert "feedback lags" not in words
     place = f"{1e9 * change['x']:.3g} nm (trace)"
     assert f"from the {change['from']} to the {change['to']} state at {place}" in words
@@ -125,7 +125,7 @@ def test_a_step_lags_and_is_no_change_of_state(
     same(line, report)
     off = [part for one in report["lines"] for part in one["off_setpoint"]]
     share = sum(part["periods"] for part in off) / (2 * report["periods_per_line"])
-    words = told(page)
+    words = sentence(page)
     assert f"off its setpoint over {percent(share)} of the line" in words
     assert report["branch_changes"] == [] and "keeps its state" in words
     gain = report["integral_gain"] / report["loop"]["largest_stable_gain"]
@@ -143,13 +143,13 @@ def test_a_step_may_throw_the_lever_into_the_other_state(
     (change,) = report["branch_changes"]
     assert 125e-9 < change["x"] < 325e-9
     place = f"{1e9 * change['x']:.3g} nm (trace)"
-    assert f"from the attractive to the repulsive state at {place}" in told(page)
+    assert f"from the attractive to the repulsive state at {place}" in sentence(page)
 
 
 def test_above_the_largest_gain_the_loop_rings(page: Any, address: str) -> None:
     line = shown(page, address, f"{DMT}&study.gain=6000&study.surface=flat")
     assert line["rings"]["multiplier"] > 1
-    assert "The loop rings: its gain of 6000/s is above" in told(page)
+    assert "The loop rings: its gain of 6000/s is above" in sentence(page)
 
 
 def test_a_dragged_knob_answers_by_averaging_then_exactly(
@@ -166,7 +166,7 @@ def test_a_dragged_knob_answers_by_averaging_then_exactly(
     seen.append(page.inner_text("#scan-state"))
     page.wait_for_selector("#strips[data-line=approximate]")
     assert page.inner_text("#scan-state").startswith("≈")
-    assert told(page).startswith("≈")
+    assert sentence(page).startswith("≈")
     near = page.evaluate("document.getElementById('strips').line")
     slider.evaluate("(one) => one.dispatchEvent(new Event('change'))")
     line = exact(page)
@@ -220,7 +220,7 @@ def test_only_a_lever_makes_images(page: Any, address: str, preset: str) -> None
     page.goto("about:blank")
     page.goto(f"{address}#view=scan&preset={preset}")
     page.wait_for_selector("#strips[data-line=none]", state="attached")
-    assert told(page).startswith("Only a lever makes images")
+    assert sentence(page).startswith("Only a lever makes images")
     assert page.is_hidden("#strips")
 
 
@@ -231,4 +231,4 @@ def test_a_wrong_value_is_said_in_place_of_the_sentence(
     page.fill("#scan-size", "much")
     page.press("#scan-size", "Enter")
     page.wait_for_selector("#strips[data-line=failed]")
-    assert "much" in told(page)
+    assert "much" in sentence(page)

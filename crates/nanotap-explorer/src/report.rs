@@ -79,6 +79,27 @@ pub(crate) fn of_frame(title: &str, frame: &Frame<'_>) -> Value {
     table(title, &heads, &rows)
 }
 
+/// Columns of a frame by their names, also those that only files have, as a table with these names.
+pub(crate) fn of_columns(frame: &Frame<'_>, names: &[&str]) -> (Value, Vec<Vec<String>>) {
+    let named = |name: &&str| frame.columns.iter().find(|column| column.name == *name);
+    let columns: Vec<_> = names.iter().filter_map(named).collect();
+    let heads = columns.iter();
+    let heads = heads.map(|column| json!([frame.head(column), column.label]));
+    let names = columns.iter().map(|column| &column.name);
+    let head = json!({
+        "title": "",
+        "names": names.collect::<Vec<_>>(),
+        "heads": heads.collect::<Vec<_>>(),
+    });
+    let cells = |row| {
+        columns
+            .iter()
+            .map(|column| frame.text(column, row))
+            .collect()
+    };
+    (head, (0..frame.rows).map(cells).collect())
+}
+
 /// A row of cells. With changes to the case, a click on it makes them.
 pub(crate) fn row(cells: &[String], set: Option<&Map<String, Value>>) -> Value {
     json!({ "cells": cells, "set": set })

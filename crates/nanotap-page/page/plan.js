@@ -15,8 +15,8 @@ const POINTS = ["128", "256", "512", "1024"];
 const NONE = "\n";            // the choice of no lever
 const REST = 500;             // milliseconds after a change before the map is computed anew
 const LEVER = "cantilever.lever";
-// Columns of the table of levers that are shown, by their heads.
-const SHOWN = ["lever", "k", "f₀", "tip", "peak force", "regime", "states", "line time", "conditions"];
+// Columns of the table of levers that are shown, by their names.
+const SHOWN = ["lever", "k", "f0", "tip_radius", "F_max", "regime", "states", "line_time", "holds"];
 const SAMPLE = "sample.material";
 let onChange = () => {};
 let refused = () => {};
@@ -343,15 +343,15 @@ function drawLevers() {
   const parts = [make("h2", { textContent: t("plan.levers") })];
   if (!levers.table) parts.push(make("p", { className: "small", textContent: t("plan.leversLooking", { progress: levers.progress }) }));
   else {
-    const { heads, rows } = levers.table;
+    const { names, heads, rows } = levers.table;
     const [first] = rows;
-    const at = (name) => heads.findIndex(([head]) => head === name);
+    const at = (name) => names.indexOf(name);
     // The best lever comes first.
-    const [fits, force] = [first?.cells[at("conditions")] === "yes", first?.cells[at("peak force")]];
+    const [fits, force] = [first?.cells[at("holds")] === "yes", first?.cells[at("F_max")]];
     const words = fits ? t(force.startsWith("0 ") ? "plan.leverTouchesNot" : "plan.leverDoes", { lever: first.cells[at("lever")], force }) : t("plan.leverNone");
     parts.push(make("p", { id: "plan-lever-words", textContent: `${words} ${t("plan.leversTake")}` }), make("p", { className: "small", textContent: local(levers.words.split(". ")[0]) }));
     const titles = Object.values(t("plan.leverHeads"));
-    const columns = SHOWN.map(at);
+    const columns = SHOWN.map(at).filter((column) => column >= 0);
     parts.push(make("div", { className: "wide" }, make("table", { className: "picks" },
       make("thead", {}, make("tr", {}, ...columns.map((column, k) => make("th", { scope: "col", textContent: titles[k] ?? heads[column][0], title: heads[column][1] })))),
       make("tbody", {}, ...rows.map(({ cells }) => {

@@ -22,6 +22,7 @@ use nanotap_error::Error;
 use nanotap_motions::setpoint::solve_setpoint;
 use nanotap_observe::frame::{Form, Frame, Rows, finite, frame};
 use nanotap_observe::{Dimension, Observable, ObservableSet, Observables, PhysicalMotion};
+use nanotap_quantity::number::significant;
 use nanotap_study::Study;
 use nanotap_study::request::options;
 use nanotap_study::target::{Regime, Target, TargetMotion, TargetPoint, Targets};
@@ -102,6 +103,9 @@ pub struct LeverMotion {
 pub fn time_constant(quality_factor: f64, f0: f64) -> f64 {
     quality_factor / (PI * f0)
 }
+
+/// Pixels of the line of an image whose time is reported, there and back.
+pub const LINE_PIXELS: usize = 512;
 
 /// Returns the usual integral gain in 1/s of a feedback loop: half the rate at which the amplitude of a
 /// lever with this time constant in s follows.
@@ -218,6 +222,66 @@ pub struct LeverReport {
 }
 
 impl LeverReport {
+    /// What is to be said of the table: where the quality factors come from, and why values are missing.
+    /// `option` writes the name of an option as the reader types it.
+    pub fn sentences(&self, option: impl Fn(&str) -> String) -> Vec<String> {
+        let mut sentences = vec![
+            "states: stable motions found on the way of a slowly moved lever to the setpoint; \
+             `nanotap attractors` samples initial states and may find more"
+                .to_owned(),
+            self.on_quality_factors(option),
+        ];
+        // Levers with the same reason share a sentence.
+        let mut reasons: Vec<(String, Vec<&str>)> = Vec::new();
+        for row in &self.levers {
+            let motion = row.motion.as_ref();
+            let budget = motion.and_then(|motion| motion.budget.as_ref());
+            let reason = match (&row.reason, budget) {
+                (Some(reason), _) => reason.clone(),
+                (None, Some(budget)) => format!("other states may be missing: {budget}"),
+                (None, None) => continue,
+            };
+            match reasons.iter_mut().find(|(other, _)| *other == reason) {
+                Some((_, levers)) => levers.push(&row.lever),
+                None => reasons.push((reason, vec![&row.lever])),
+            }
+        }
+        let reasons = reasons.into_iter();
+        sentences
+            .extend(reasons.map(|(reason, levers)| format!("{}: {reason}", levers.join(", "))));
+        sentences
+    }
+
+    /// Where the quality factors come from.
+    fn on_quality_factors(&self, option: impl Fn(&str) -> String) -> String {
+        let source = match self.quality_factor_source {
+            QualityFactorSource::Air => "of each lever in air, by its dimensions (Sader 1998)",
+            QualityFactorSource::Fluid => {
+                "of each lever in the fluid of the case, by its dimensions (Sader 1998)"
+            }
+            QualityFactorSource::Case => "that of the case for every lever",
+        };
+        let text = format!("Q: {source}; τ = Q/(π f0) is the time constant of the amplitude");
+        let farthest = self
+            .levers
+            .iter()
+            .filter_map(|row| {
+                let air = row.quality_factor_in_air?;
+                let ratio = (air / row.quality_factor).max(row.quality_factor / air);
+                Some((row, air, ratio))
+            })
+            .max_by(|a, b| a.2.total_cmp(&b.2));
+        match farthest.filter(|_| self.quality_factor_source == QualityFactorSource::Case) {
+            None => text,
+            Some((row, air, _)) => format!(
+                "{text}. In air the dimensions of {} give Q = {}; {} air computes that of each lever",
+                row.lever,
+                significant(air, 3),
+                option("quality_factor")
+            ),
+        }
+    }
+
     /// The levers with their motions.
     pub fn lever_table<'a>(&'a self) -> Frame<'a> {
         let four = |kind| (Dimension::Si(kind), Form::Prefixed(4));
@@ -239,19 +303,31 @@ impl LeverReport {
         };
         frame! { Rows::new("levers", &self.levers, None);
             "lever", "lever", Plain => |row| &row.lever;
+            .label("Name in the catalogue");
             "holds", "fits", Plain => holds;
+            .label("Whether all conditions hold");
             "k", "k", four(Kind::Stiffness) => |row| finite(row.k);
+            .label("Spring constant");
             "f0", "f0", four(Kind::Frequency) => |row| finite(row.f0);
+            .label("Free resonance");
             "Q", "Q", four(Kind::Number) => |row| finite(row.quality_factor);
+            .label("Quality factor");
             "tip_radius", "radius", four(Kind::Length) => |row| row.tip_radius.and_then(finite);
+            .label("Radius of the tip");
             "F_max", "F_max", four(Kind::Force) => move |row| finite(motion(row)?.peak_force);
+            .label("Peak force at the setpoint");
             "indentation", "indentation", four(Kind::Length) =>
                 move |row| finite(motion(row)?.indentation);
             "regime", "regime", Plain => regime;
+            .label("Whether the mean force attracts or repels");
             "states", "states", Plain => |row| Some(row.motion.as_ref()?.states);
+            .label("Stable motions found at this distance");
             "A", "A", four(Kind::Length) => move |row| finite(motion(row)?.first_harmonic);
             "phase", "phase", (Angle, Digits(4)) => move |row| Some(motion(row)?.phase);
             "time_constant", "τ", four(Kind::Time) => |row| finite(row.time_constant);
+            "line_time", "line time", four(Kind::Time) =>
+                |row| finite(row.time_constant * LINE_PIXELS as f64); .only_in_files();
+            .label("512 pixels there and back, with one time constant Q/(π f0) of the amplitude each");
             .without(unconditional);
             .aligned(Point, Point);
         }

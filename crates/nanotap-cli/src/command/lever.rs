@@ -2,10 +2,10 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::study::lever::{LeverOptions, LeverReport, LeverStudy, QualityFactorSource};
+use nanotap::study::lever::{LeverOptions, LeverReport, LeverStudy};
 
 use crate::arguments::CaseArguments;
-use crate::failure::Failure;
+use crate::failure::{Failure, flag};
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::page::paragraph;
@@ -54,61 +54,8 @@ fn text(case: &GivenCase, report: &LeverReport) -> String {
             report.levers.len()
         )));
     }
-    text.push_str(&paragraph(
-        "states: stable motions found on the way of a slowly moved lever to the setpoint; `nanotap \
-         attractors` samples initial states and may find more",
-    ));
-    text.push_str(&paragraph(&quality_factors(report)));
-    // Levers with the same reason share a sentence.
-    let mut reasons: Vec<(String, Vec<&str>)> = Vec::new();
-    for row in &report.levers {
-        let budget = row
-            .motion
-            .as_ref()
-            .and_then(|motion| motion.budget.as_ref());
-        let reason = match (&row.reason, budget) {
-            (Some(reason), _) => reason.clone(),
-            (None, Some(budget)) => format!("other states may be missing: {budget}"),
-            (None, None) => continue,
-        };
-        match reasons.iter_mut().find(|(other, _)| *other == reason) {
-            Some((_, levers)) => levers.push(&row.lever),
-            None => reasons.push((reason, vec![&row.lever])),
-        }
-    }
-    for (reason, levers) in reasons {
-        text.push_str(&paragraph(&format!("{}: {reason}", levers.join(", "))));
-    }
-    text
-}
-
-/// Where the quality factors come from.
-fn quality_factors(report: &LeverReport) -> String {
-    let source = match report.quality_factor_source {
-        QualityFactorSource::Air => "of each lever in air, by its dimensions (Sader 1998)",
-        QualityFactorSource::Fluid => {
-            "of each lever in the fluid of the case, by its dimensions (Sader 1998)"
-        }
-        QualityFactorSource::Case => "that of the case for every lever",
-    };
-    let mut text = format!("Q: {source}; τ = Q/(π f0) is the time constant of the amplitude");
-    let known = report.levers.iter().filter_map(|row| {
-        let air = row.quality_factor_in_air?;
-        Some((
-            row,
-            air,
-            (air / row.quality_factor).max(row.quality_factor / air),
-        ))
-    });
-    if report.quality_factor_source == QualityFactorSource::Case
-        && let Some((row, air, _)) = known.max_by(|a, b| a.2.total_cmp(&b.2))
-    {
-        let hint = format!(
-            ". In air the dimensions of {} give Q = {}; --quality-factor air computes that of each lever",
-            row.lever,
-            number::significant(air, 3)
-        );
-        text.push_str(&hint);
+    for sentence in report.sentences(flag) {
+        text.push_str(&paragraph(&sentence));
     }
     text
 }

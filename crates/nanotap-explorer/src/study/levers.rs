@@ -2,7 +2,7 @@
 
 use nanotap::case::Key;
 use nanotap::case::quantity::Kind;
-use nanotap::study::lever::{LeverOptions, LeverStudy, QualityFactorSource, case_with_lever};
+use nanotap::study::lever::{LeverOptions, LeverStudy, case_with_lever};
 use nanotap::study::registry::Study as _;
 use nanotap::study::request::read;
 use serde_json::{Value, json};
@@ -12,8 +12,19 @@ use crate::api_error::ApiError;
 use crate::forms;
 use crate::report;
 
-/// Pixels of a line of an image, there and back.
-const LINE_PIXELS: f64 = 512.0;
+/// Columns that the page shows.
+const SHOWN: [&str; 10] = [
+    "lever",
+    "k",
+    "f0",
+    "Q",
+    "tip_radius",
+    "F_max",
+    "regime",
+    "states",
+    "line_time",
+    "holds",
+];
 
 impl Studied<'_> {
     /// Levers of the catalogue on the sample of the case.
@@ -24,7 +35,6 @@ impl Studied<'_> {
         let own = self.request.case.any_distance(self.app)?;
         let case = spec.any_distance(self.app)?;
         let conditions = self.conditions()?;
-        let unconditional = conditions.is_empty();
         let mut options = object(json!({ "where": conditions }));
         if self.field("tip")? == forms::OWN_TIP {
             options.insert("keep_tip".into(), true.into());
@@ -38,68 +48,23 @@ impl Studied<'_> {
         let report = self.counting(LeverStudy::COUNTED, |control| {
             LeverStudy::run(&case, &read, control)
         })?;
-        let shown = |kind: Kind, value: f64| {
-            if value.is_finite() {
-                kind.format_digits(value, 3)
-            } else {
-                String::new()
-            }
-        };
-        let rows = report.levers.iter().map(|lever| {
-            let motion = lever.motion.as_ref();
-            let cells = [
-                lever.lever.clone(),
-                shown(Kind::Stiffness, lever.k),
-                shown(Kind::Frequency, lever.f0),
-                shown(Kind::Number, lever.quality_factor),
-                shown(Kind::Length, lever.tip_radius.unwrap_or(f64::NAN)),
-                match (motion, &lever.reason) {
-                    (Some(motion), _) => shown(Kind::Force, motion.physical.observables.peak_force),
-                    (None, Some(reason)) => reason.clone(),
-                    (None, None) => String::new(),
-                },
-                motion.map_or_else(String::new, |motion| motion.regime.to_owned()),
-                motion.map_or_else(String::new, |motion| motion.states.to_string()),
-                shown(Kind::Time, lever.time_constant * LINE_PIXELS),
-                lever
-                    .holds
-                    .map_or("", |holds| if holds { "yes" } else { "no" })
-                    .to_owned(),
-            ];
+        let frame = report.lever_table();
+        let (mut table, rows) = report::of_columns(&frame, &SHOWN);
+        let rows = report.levers.iter().zip(rows).map(|(lever, cells)| {
             let taken = case_with_lever(&case, &lever.lever, &read).ok();
             let set = taken.map(|taken| report::changes(&own, &taken));
-            let shown = &cells[..cells.len() - usize::from(unconditional)];
-            report::row(shown, set.as_ref().filter(|_| motion.is_some()))
+            report::row(&cells, set.as_ref().filter(|_| lever.motion.is_some()))
         });
-        let line = format!(
-            "{LINE_PIXELS} pixels there and back, with one time constant Q/(π f0) of the amplitude each"
-        );
-        let heads = [
-            ("lever", "Name in the catalogue"),
-            ("k", "Spring constant"),
-            ("f₀", "Free resonance"),
-            ("Q", "Quality factor"),
-            ("tip", "Radius of the tip"),
-            ("peak force", "At the setpoint"),
-            ("regime", "Whether the mean force attracts or repels"),
-            ("states", "Stable motions found at this distance"),
-            ("line time", line.as_str()),
-            ("conditions", "Whether all conditions hold"),
-        ];
-        let heads = &heads[..heads.len() - usize::from(unconditional)];
+        table["rows"] = rows.collect();
         self.hand(Stage {
             words: format!(
-                "{} levers at A₀ = {} and setpoint {setpoint}, with {}. A click on a row chooses that lever.",
+                "{} levers at A₀ = {} and setpoint {setpoint}. A click on a row chooses that lever. {}",
                 report.levers.len(),
-                shown(Kind::Length, report.free_amplitude),
-                match report.quality_factor_source {
-                    QualityFactorSource::Case => "the quality factor of the case",
-                    QualityFactorSource::Fluid => "quality factors in the fluid of the case",
-                    QualityFactorSource::Air => "quality factors in air",
-                }
+                Kind::Length.format_digits(report.free_amplitude, 3),
+                report.sentences(str::to_owned).join(". "),
             ),
             studies: &[("lever", &options)],
-            tables: vec![report::table("", heads, &rows.collect::<Vec<_>>())],
+            tables: vec![table],
             ..Stage::default()
         })
     }

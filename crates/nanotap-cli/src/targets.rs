@@ -46,13 +46,20 @@ pub(crate) fn text(found: &TargetReport, over: &[Over]) -> String {
             format!("{} from {low_text} to {high_text}", over.key.path())
         }
     });
-    let centre = over.iter().zip(&region.centre);
+    // Of few points, each is at an edge.
+    let mut sides = region.ranges.iter().zip(&region.centre);
+    let is_inside = sides.all(|([low, high], at)| low == high || (at - low) * (at - high) < 0.0);
+    let centre = over.iter().zip(&region.centre).filter(|_| is_inside);
     let centre = centre.map(|(over, at)| format!("{} = {}", over.key.path(), value(over, *at)));
     let [ranges, centre] = [ranges.collect::<Vec<_>>(), centre.collect()].map(|w| w.join(" and "));
+    let farthest = match centre.is_empty() {
+        true => String::new(),
+        false => format!("; farthest from its edges is {centre}"),
+    };
     format!(
         "{all}{}",
         paragraph(&format!(
-            "largest rectangle: {ranges}, {}; its centre is {centre}",
+            "largest rectangle: {ranges}, {}{farthest}",
             number::counted(region.points, "point", "points"),
         ))
     )

@@ -401,8 +401,8 @@ pub struct TargetReport {
 pub struct TargetRegion {
     /// Lowest and highest value of each parameter, in the unit of its key.
     pub ranges: Vec<[f64; 2]>,
-    /// Value of each parameter at the centre, the point farthest from the edges, in the unit of its
-    /// key.
+    /// Value of each parameter at the point farthest from the edges, the lower one of an even number, in
+    /// the unit of its key.
     pub centre: Vec<f64>,
     /// Number of points in the rectangle.
     pub points: usize,

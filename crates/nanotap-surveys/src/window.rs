@@ -382,7 +382,7 @@ impl WindowOptions {
         let over = self.over.parse(case)?;
         <[Over; 2]>::try_from(over).map_err(|over| {
             Error::input(
-                format!("{} parameters make no window: two are needed", over.len()),
+                format!("a window has two parameters, got {}", over.len()),
                 "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
             )
         })

@@ -142,12 +142,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {
         let periods: BTreeSet<usize> = report.coexisting.iter().filter_map(|p| p.period).collect();
         let periods: Vec<String> = periods.iter().map(ToString::to_string).collect();
-        let [near, far] = [last, first].map(|p| shown(Kind::Length, p.gap));
-        let place = if near == far {
-            format!("at {near}")
-        } else {
-            format!("from {near} to {far}")
-        };
+        let place = stretch([last, first].map(|p| shown(Kind::Length, p.gap)));
         text.push_str(&motion::paragraph(&format!(
             "{place} further motions attract that neither way met (period {}): --out and --plot \
              have them",
@@ -156,9 +151,8 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     }
     for interval in &report.hysteresis {
         text.push_str(&motion::paragraph(&format!(
-            "hysteresis from {} to {}: the amplitudes of the two ways differ by up to {}",
-            shown(Kind::Length, interval.near),
-            shown(Kind::Length, interval.far),
+            "hysteresis {}: the amplitudes of the two ways differ by up to {}",
+            stretch([interval.near, interval.far].map(|gap| shown(Kind::Length, gap))),
             shown(Kind::Length, interval.difference)
         )));
     }
@@ -254,13 +248,21 @@ fn modulated(
     }
     for interval in &report.hysteresis {
         text.push_str(&motion::paragraph(&format!(
-            "hysteresis from {} to {}: Δf/f0 of the two ways differs by up to {}",
-            shown(Kind::Length, interval.near),
-            shown(Kind::Length, interval.far),
+            "hysteresis {}: Δf/f0 of the two ways differs by up to {}",
+            stretch([interval.near, interval.far].map(|gap| shown(Kind::Length, gap))),
             number::significant(interval.difference, 4)
         )));
     }
     text
+}
+
+/// A stretch of distances in words, which may be a single one.
+fn stretch([near, far]: [String; 2]) -> String {
+    if near == far {
+        format!("at {near}")
+    } else {
+        format!("from {near} to {far}")
+    }
 }
 
 fn energy(value: f64, units: &Units) -> String {

@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let case = GivenCase::with_implied(&arguments.case, &implied, any_distance, output)?;
     let over = options.over.parse(&case)?;
     let mut keys: Vec<Key> = over.iter().map(|over| over.key).collect();
-    if case.leaves_distance_to_setpoint() {
+    if case.leaves_distance_to_setpoint() && !keys.contains(&Key::DriveSetpoint) {
         // The distance is solved at each point.
         keys.push(Key::DriveSetpoint);
     }

@@ -296,7 +296,7 @@ fn the_window_reports_where_one_motion_exists() {
     assert_eq!(again.json()["conditions"], json["conditions"]);
     folder
         .run(&["window", "lever.toml", "--over", "gap.tip=15nm:30nm:2"])
-        .refused(&["1 parameters make no window", "twice"]);
+        .refused(&["a window has two parameters, got 1", "twice"]);
 }
 
 /// An image of independent lines is a dataset that resumes; its report, figure and table are those

@@ -651,9 +651,9 @@ def fit(
     free : Sequence[str] | None
         Parameters to find: keys of the case, gap.offset, NAME.offset or NAME.scale
         of a column, and terms of the instrument: NAME.tilt, NAME.curvature,
-        NAME.interference, NAME.drag, gap.drift, gap.backlash; of a force curve
-        without other names than these terms, too: modulus, contact point, baseline,
-        and the adhesion of the law.
+        NAME.interference, NAME.drag, gap.drift, gap.backlash. Of a force curve for
+        which no key is named, the sample's modulus, the contact point, the baseline
+        and the adhesion of the law are found.
     per_curve : Sequence[str] | None
         Parameters to find with one value per curve.
     convert : Sequence[str] | None

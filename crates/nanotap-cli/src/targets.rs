@@ -52,9 +52,10 @@ pub(crate) fn text(found: &TargetReport, over: &[Over]) -> String {
     let centre = over.iter().zip(&region.centre).filter(|_| is_inside);
     let centre = centre.map(|(over, at)| format!("{} = {}", over.key.path(), value(over, *at)));
     let [ranges, centre] = [ranges.collect::<Vec<_>>(), centre.collect()].map(|w| w.join(" and "));
-    let farthest = match centre.is_empty() {
-        true => String::new(),
-        false => format!("; farthest from its edges is {centre}"),
+    let farthest = if centre.is_empty() {
+        String::new()
+    } else {
+        format!("; farthest from its edges is {centre}")
     };
     format!(
         "{all}{}",

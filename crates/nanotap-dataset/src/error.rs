@@ -37,9 +37,9 @@ pub enum StoreError {
     },
     /// Two stores that are not shares of one dataset.
     #[error(
-        "{} and {} are not shares of one dataset: {}",
-        first.display(),
+        "{} (there) and {} (here) are not shares of one dataset: {}",
         path.display(),
+        first.display(),
         differences.join("; ")
     )]
     Foreign {

@@ -175,12 +175,13 @@ impl NonlinearRun<'_> {
             let touches = nonlinear.contact[sample.branch];
             let signals = outputs.iter().zip(&self.of.required.signals);
             let values: Vec<f64> = signals
-                .map(
-                    |(output, signal)| match signal.is_of_contact() && !touches {
-                        true => 0.0,
-                        false => read(nonlinear, output, sample),
-                    },
-                )
+                .map(|(output, signal)| {
+                    if signal.is_of_contact() && !touches {
+                        0.0
+                    } else {
+                        read(nonlinear, output, sample)
+                    }
+                })
                 .collect();
             for (sum, functional) in sums.iter_mut().zip(functionals) {
                 let time = offset + sample.time;

@@ -278,8 +278,7 @@ observables! {
         "contacts per drive period", "contacts begun per drive period",
         |m| m.contacts().count as f64 / m.periods();
     peak_force as "F_max": f64, Force, common,
-        "peak force $F_{max}$",
-        "largest force with which the sample pushes the tip; 0 where it only pulls",
+        "peak force $F_{max}$", "largest force of the sample on the tip",
         |m| m.peak_force();
     impact_speed: f64, Velocity, common,
         "impact speed", "largest speed at which a contact begins",

@@ -89,9 +89,12 @@ pub(super) fn gather(
             let is_zero = |output: usize| of_contact[output] && !touches[at.branch];
             for (column, varied) in all.iter_mut().enumerate() {
                 let numbers = 0..outputs.len();
-                let value = |output| match is_zero(output) {
-                    true => Dual::default(),
-                    false => Dual::new(at.values[output], at.change(output, column)),
+                let value = |output| {
+                    if is_zero(output) {
+                        Dual::default()
+                    } else {
+                        Dual::new(at.values[output], at.change(output, column))
+                    }
                 };
                 let values: Vec<Dual> = numbers.map(value).collect();
                 let weight = Dual::new(at.weight, at.widening[column]);

@@ -67,7 +67,7 @@ impl Measurement {
         let rows = [
             (
                 "spectrum",
-                options.spectrum.is_some() && !(file && is_spectrum),
+                options.spectrum.is_some() && (table || !is_spectrum),
                 "names a spectrum of an instrument's file",
             ),
             (
@@ -82,7 +82,7 @@ impl Measurement {
             ),
             (
                 "rate",
-                options.rate.is_some() && !(table && !is_spectrum),
+                options.rate.is_some() && (file || is_spectrum),
                 "is that of deflections in a table",
             ),
             (

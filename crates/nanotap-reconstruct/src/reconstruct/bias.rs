@@ -58,7 +58,7 @@ pub(super) fn widen_between(values: &mut [[f64; 2]], x: &[f64], measured: &[(f64
         } else {
             (*value - value.clamp(low, high)).abs() + (high - low) / 12f64.sqrt()
         };
-        *error = error.hypot(bias);
+        *error = (*error * *error + bias * bias).sqrt();
     }
 }
 

@@ -214,7 +214,7 @@ pub enum ProfileOptions {
 pub struct ScanOptions {
     /// How the drive periods are computed
     pub method: Option<Method>,
-    /// Drive periods to list, counted from the start of settling
+    /// Drive periods that the JSON document lists, counted from the start of settling
     #[schemars(extend("x-value" = "K1,K2,…"))]
     pub list: Vec<usize>,
     /// Length of a line

@@ -627,8 +627,8 @@ pub fn reached_distances(
         let held = HeldQuantity::new(held, &free, view.scales.force)?;
         searches.push(Search::new(case, held, free));
     }
-    let helds: Vec<HeldQuantity> = searches.iter().map(|search| search.held).collect();
-    let (mut sweep, place) = from_far(case, &helds, free, control)?;
+    let setpoints: Vec<HeldQuantity> = searches.iter().map(|search| search.held).collect();
+    let (mut sweep, place) = from_far(case, &setpoints, free, control)?;
     approach(&mut sweep, place, &mut searches, control)?;
     let results = searches.iter_mut().map(|search| search.result(&sweep));
     Ok(results

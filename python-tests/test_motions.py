@@ -371,7 +371,7 @@ def test_physical_quantities_vary(physical):
     assert float(window.share.sum()) == pytest.approx(1)
     # Beyond its free amplitude the tip touches nothing.
     assert window.condition.values[1, 2] == "no-contact"
-    with pytest.raises(ValueError, match="two are needed"):
+    with pytest.raises(ValueError, match="a window has two parameters"):
         nanotap.window(physical, over="gap.tip=15nm:30nm:3")
     # The distance of a setpoint is solved, and the motion there has its amplitude.
     swept = nanotap.sweep(

@@ -1411,7 +1411,8 @@ def scan(
     method : Literal["exact", "fast", "quasi-static"] | None
         How the drive periods are computed.
     list : Any
-        Drive periods to list, counted from the start of settling.
+        Drive periods that the JSON document lists, counted from the start of
+        settling.
     size : float | str | None
         Length of a line.
     size_y : float | str | None

@@ -27,6 +27,10 @@ impl From<CantileverError> for CaseError {
     }
 }
 
+/// How a quantity of a physical case is named.
+pub(crate) const NAME_A_QUANTITY: &str =
+    "name a quantity of the case file as section.key, as in drive.frequency";
+
 /// A name that is not a key that can vary.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoSuchKey {
@@ -104,10 +108,7 @@ impl From<CaseError> for nanotap_error::Error {
 impl From<NoSuchKey> for nanotap_error::Error {
     fn from(error: NoSuchKey) -> Self {
         match error {
-            NoSuchKey::Fixed { .. } => Self::input(
-                error.to_string(),
-                "name a quantity of the case file as section.key, as in drive.frequency",
-            ),
+            NoSuchKey::Fixed { .. } => Self::input(error.to_string(), NAME_A_QUANTITY),
             NoSuchKey::Unknown { given, hint } => {
                 Self::input(format!("no parameter `{given}` here"), hint)
             }

@@ -475,8 +475,7 @@ impl Case {
             if near_name(plain, keys.iter().map(|key| key.path())).is_none() {
                 return Err(NoSuchKey::Unknown {
                     given: plain.to_owned(),
-                    hint: "name a quantity of the case file as section.key, as in drive.frequency"
-                        .to_owned(),
+                    hint: error::NAME_A_QUANTITY.to_owned(),
                 });
             }
         }

@@ -668,13 +668,10 @@ fn without_unit(header: &Header, kind: Kind) -> Error {
 }
 
 fn unit_of_key(header: &Header, key: Key, case: &Case) -> Result<f64, Error> {
-    let kind = match key.kind() {
-        kind if !case.is_physical() || kind == Kind::Number => None,
-        kind => Some(kind),
-    };
-    let unit = match (header.unit.as_str(), kind) {
-        ("", Some(Kind::Length)) => return Err(without_unit(header, Kind::Length)),
-        ("", Some(kind)) => kind.si_unit(),
+    let unit = match (header.unit.as_str(), key.kind()) {
+        ("", kind) if !case.is_physical() || kind == Kind::Number => "",
+        ("", Kind::Length) => return Err(without_unit(header, Kind::Length)),
+        ("", kind) => kind.si_unit(),
         (unit, _) => unit,
     };
     let text = format!("1 {unit}");

@@ -36,7 +36,7 @@ use serde::Serialize;
 use crate::approach::distance_sweep::{
     DistanceSweep, FoundMotion, Motion, Piece, Place, budget_text, is_same,
 };
-use crate::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way};
+use crate::approach::{ApproachReport, BEYOND, MAX_MULTIPLIER, SETPOINT_PERIODS, Way};
 use crate::frequency_modulation::{self, FrequencyModulationOptions};
 use nanotap_case::document::{CaseDocument, WithoutDistanceDocument, equilibria};
 use nanotap_case::physical::{Held, Kind, Physical, Remark};
@@ -382,28 +382,32 @@ fn solve_shift(
         shift: Some(Amount::from(format!("{shift} Hz").as_str())),
         ..FrequencyModulationOptions::default()
     };
-    // The shift may be passed beyond the reach of the tip already.
-    let mut far = crate::approach::BEYOND;
-    while far <= FARTHEST {
+    let curve_from = |options: &FrequencyModulationOptions| {
+        frequency_modulation::frequency_modulation(case, options, control)
+    };
+    let is_passed = |curve: &ApproachReport| {
+        let first = curve.table.iter().find_map(|p| p.modulation_si);
+        first.is_some_and(|first| first.frequency_shift / shift >= 1.0)
+    };
+    let mut curve = curve_from(&options)?;
+    // Then the shift is passed beyond the reach of the tip already: two points say from where it is not.
+    let mut far = BEYOND;
+    while is_passed(&curve) && far <= FARTHEST && !control.is_cancelled() {
+        far *= 2.0;
         let distance = |far: f64| {
             let text = format!("{:e} m", far * free.reach * unit);
             Some(Amount::from(text.as_str()))
         };
-        let probe = FrequencyModulationOptions {
-            from: distance(far),
+        options.from = distance(far);
+        curve = curve_from(&FrequencyModulationOptions {
             to: distance(0.95 * far),
             points: 2,
-            ..FrequencyModulationOptions::default()
-        };
-        let probe = frequency_modulation::frequency_modulation(case, &probe, control)?;
-        let first = probe.table.iter().find_map(|p| p.modulation_si);
-        if !first.is_some_and(|first| first.frequency_shift / shift >= 1.0) {
-            break;
-        }
-        far *= 2.0;
-        options.from = distance(far);
+            ..options.clone()
+        })?;
     }
-    let curve = frequency_modulation::frequency_modulation(case, &options, control)?;
+    if far > BEYOND {
+        curve = curve_from(&options)?;
+    }
     if control.is_cancelled() {
         return Err(cancelled());
     }

@@ -116,13 +116,17 @@ class Answers:
             self.known[question] = asked(self.address, path, body)
         return self.known[question]
 
-    def given(self, page: Any, path: str, only_known: bool = False) -> None:
-        """Gives them to a page that makes the same requests; new ones are made now or left to the server."""
+    def given(
+        self, page: Any, path: str, new: Callable[[dict[str, Any]], bool] | None = None
+    ) -> None:
+        """Gives them to a page that makes the same requests; new ones are made now, or left to the server where
+        `new` says no: their stages then come one by one.
+        """
 
         def give(route: Any) -> None:
             body = route.request.post_data_json
             question = json.dumps([path, body], sort_keys=True)
-            if only_known and question not in self.known:
+            if question not in self.known and new is not None and not new(body):
                 route.continue_()
                 return
             answer = self.to(path, body)

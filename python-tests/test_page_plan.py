@@ -13,10 +13,13 @@ from typing import Any
 
 import pytest
 from browsers import WAIT, Answers, asked, case_file, limited, printed
+from test_page_numbers import german_is_english
 from test_page_states import until
 
 WISHES = {"force": "1.6 nN", "want": "one", "points": "256", "step": "10 nm"}
 CASE = {"preset": "dmt", "set": ["drive.setpoint=0.8"]}
+# A wish that nothing meets.
+HARD = "&plan.force=0.2&plan.want=tap"
 
 
 def terminal(command: str, path: Path, *words: str) -> dict[str, Any]:
@@ -56,7 +59,7 @@ def _limit() -> Iterator[None]:
 def page(browser: Any, answers: Answers, stages: list[dict[str, Any]]) -> Any:
     page = browser.new_page(viewport={"width": 1440, "height": 900})
     page.set_default_timeout(1000 * WAIT)
-    answers.given(page, "/api/study", only_known=True)
+    answers.given(page, "/api/study", new=lambda body: body["tab"] == "levers")
     page.complaints = []
     page.on("pageerror", lambda error: page.complaints.append(str(error)))
     return page
@@ -195,7 +198,7 @@ def test_a_wish_that_nothing_meets_has_its_nearest(
     least = min(tapping, key=lambda point: point["force"]["value"])
     gentlest = plan["points"][fails["gentlest"]]
     assert gentlest["force"]["value"] == least["force"]["value"] > 0.2e-9
-    view(page, address, "&plan.force=0.2&plan.want=tap")
+    view(page, address, HARD)
     assert page.text_content("#plan-head") == "Nothing here meets your wishes"
     assert least["force"]["shown"] in page.text_content("#plan-say")
     assert page.is_hidden("#plan-line")
@@ -241,7 +244,7 @@ def test_its_states_are_shown_with_its_values(
 
 
 def test_a_lever_of_the_table_is_taken(page: Any, address: str) -> None:
-    view(page, address)
+    view(page, address, HARD)
     page.select_option("#plan-lever", label="I have no lever yet")
     page.wait_for_selector("#plan-levers tbody tr")
     name = page.text_content("#plan-levers tbody tr button")
@@ -252,3 +255,10 @@ def test_a_lever_of_the_table_is_taken(page: Any, address: str) -> None:
     assert f"set.cantilever.lever={name}" in urllib.parse.unquote_plus(page.url)
     page.click("#take-back")
     until(page, lambda: "cantilever.lever" not in page.url)
+
+
+def test_german_numbers_of_the_plan_are_the_english_ones(
+    page: Any, address: str
+) -> None:
+    # Wherever a number with decimals is: with the answers of the map that was shown.
+    german_is_english(page, address, "plan", "preset=dmt&set.drive.setpoint=0.8")

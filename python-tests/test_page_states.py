@@ -7,7 +7,7 @@ import re
 import subprocess
 import time
 import urllib.parse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,20 @@ def states(page: Any, address: str, fragment: str, wait: str = "rows") -> None:
     page.goto("about:blank")
     page.goto(f"{address}#{fragment}")
     settled(page, wait)
+
+
+# What the view computes beside its rows.
+BESIDE = ("/api/curve", "/api/attractors", "/api/margins", "/api/knock")
+
+
+@pytest.fixture
+def rows_alone(page: Any) -> Iterator[None]:
+    """Nothing beside the rows is computed: these requests stay without an answer."""
+    for path in BESIDE:
+        page.route(f"**{path}", lambda _: None)
+    yield
+    for path in BESIDE:
+        page.unroute(f"**{path}")
 
 
 def left(page: Any) -> None:
@@ -203,6 +217,7 @@ def changed(
 
 
 # The laws in parts, so that none takes longer than a test may.
+@pytest.mark.usefixtures("rows_alone")
 @pytest.mark.parametrize("part", range(8))
 def test_every_law_shows_the_terminals_states(
     page: Any, address: str, tmp_path: Path, part: int

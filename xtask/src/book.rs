@@ -30,7 +30,7 @@ pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<Tally, St
         fs::copy(workspace.root.join("docs").join(name), folder.join(name))
             .map_err(|error| format!("cannot copy docs/{name}: {error}"))?;
     }
-    let mut lay_out = workspace.cargo(&["run", "--release", "--package", "nanotap-book", "--"]);
+    let mut lay_out = workspace.program("nanotap-book")?;
     lay_out.arg(&workspace.root).arg(&sources).args(options);
     for command in [&mut lay_out, mdbook.arg("build").arg(&folder)] {
         must(&workspace.root, command, "the site could not be built")?;

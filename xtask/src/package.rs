@@ -1,11 +1,11 @@
 //! The packages to be published: every crate and the Python package, each built from its own
 //! archive alone and tested in an empty environment.
 
-use std::env;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::process::Command;
+use std::{fs, io};
 
-use crate::process::{check, output, succeeds};
+use crate::process::{check, must, output, succeeds};
 use crate::tally::Tally;
 use crate::tools::{Environment, Workspace};
 use crate::wheel::with_extension;
@@ -17,33 +17,76 @@ found = nanotap.orbit(nanotap.Case.paper(omega=20.0))
 assert found.period == 1 and found.stable, found
 print('nanotap', nanotap.__version__, 'from its source archive:', found)";
 
-/// Packs every published crate and compiles the archives.
+/// Packages of this workspace that are not published as crates.
+const UNPUBLISHED: [&str; 5] = [
+    "xtask",
+    "nanotap-book",
+    "nanotap-bundle",
+    "nanotap-python",
+    "nanotap-web",
+];
+
+/// Packs every published crate and checks that the contents of the archives compile together.
 ///
 /// # Errors
-/// If cargo cannot be started.
+/// If a tool is missing, or the archives cannot be unpacked.
 pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
-    let target = workspace.target().join("packed");
-    forget(&target);
+    let folder = workspace.target().join("packed");
+    // Archives of an earlier state would be unpacked as well.
+    let _ = fs::remove_dir_all(&folder);
     let mut command = workspace.cargo(&["package", "--workspace", "--locked"]);
-    command.arg("--target-dir").arg(&target);
-    for own in [
-        "xtask",
-        "nanotap-book",
-        "nanotap-bundle",
-        "nanotap-python",
-        "nanotap-web",
-    ] {
+    command.arg("--target-dir").arg(&folder);
+    for own in UNPUBLISHED {
         command.args(["--exclude", own]);
     }
-    // The build tests compilation, not speed; uncommitted changes are packed too.
-    command.args(["--allow-dirty", "--config", "profile.dev.opt-level=0"]);
-    command.args(["--config", "profile.dev.debug=0"]);
-    check(&workspace.root, &mut command)
+    // Uncommitted changes are packed too. Cargo would compile each archive by itself, the dependencies of
+    // some with other features: four times the work of all together.
+    command.args(["--allow-dirty", "--no-verify"]);
+    if !succeeds(&workspace.root, &mut command)? {
+        return Ok(Tally::check(false));
+    }
+    let sources = folder.join("sources");
+    let failed = |error: io::Error| format!("cannot write {}: {error}", sources.display());
+    fs::create_dir_all(&sources).map_err(failed)?;
+    let mut members = Vec::new();
+    for archive in with_extension(&folder.join("package"), "crate") {
+        // As of now: all files of an archive have the same time, so that changed ones would look compiled.
+        let mut unpack = Command::new("tar");
+        unpack.arg("-xmzf").arg(&archive).arg("-C").arg(&sources);
+        must(&folder, &mut unpack, "an archive cannot be unpacked")?;
+        members.extend(
+            archive
+                .file_stem()
+                .and_then(|name| name.to_str())
+                .map(str::to_owned),
+        );
+    }
+    fs::write(sources.join("Cargo.toml"), manifest(&members)).map_err(failed)?;
+    fs::copy(
+        workspace.root.join("Cargo.lock"),
+        sources.join("Cargo.lock"),
+    )
+    .map_err(failed)?;
+    // What clippy has checked of the dependencies is taken from there.
+    let mut compile = workspace.cargo(&["check", "--workspace", "--release", "--target-dir"]);
+    check(&sources, compile.arg(workspace.target()))
 }
 
-/// Whether a crate, or what cargo made of it, is one of this workspace by its name.
-fn is_own(name: &str) -> bool {
-    name.starts_with("nanotap") || name.starts_with("afm-")
+/// A workspace of unpacked archives, in which each takes the others from beside it.
+fn manifest(members: &[String]) -> String {
+    let quoted: Vec<String> = members.iter().map(|name| format!("{name:?}")).collect();
+    let mut text = format!(
+        "[workspace]\nresolver = \"3\"\nmembers = [{}]\n\n[patch.crates-io]\n",
+        quoted.join(", ")
+    );
+    for folder in members {
+        // The folder of a crate is its name and its version.
+        let name = folder
+            .rsplit_once('-')
+            .map_or(folder.as_str(), |(name, _)| name);
+        text.extend([name, " = { path = \"", folder, "\" }\n"]);
+    }
+    text
 }
 
 /// Removes what tells cargo that the crates of this workspace are compiled, from the folder of a profile.
@@ -53,32 +96,10 @@ fn forget_compiled(profile: &Path) {
         return;
     };
     for one in known.flatten() {
-        if is_own(&one.file_name().to_string_lossy()) {
+        let name = one.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("nanotap") || name.starts_with("afm-") {
             let _ = fs::remove_dir_all(one.path());
-        }
-    }
-}
-
-/// Cargo assumes that a version never changes: files unpacked and compiled from an earlier state of
-/// the same version would be used instead of the new ones.
-fn forget(target: &Path) {
-    let _ = fs::remove_dir_all(target.join("package"));
-    forget_compiled(&target.join("debug"));
-    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
-    let Some(home) = home.or_else(|| Some(env::home_dir()?.join(".cargo"))) else {
-        return;
-    };
-    let Ok(registries) = fs::read_dir(home.join("registry/src")) else {
-        return;
-    };
-    let registries = registries.flatten().filter(|registry| {
-        // A source without a host is a folder, such as cargo makes of packed crates.
-        registry.file_name().to_string_lossy().starts_with('-')
-    });
-    let unpacked = registries.filter_map(|registry| fs::read_dir(registry.path()).ok());
-    for crate_ in unpacked.flatten().flatten() {
-        if is_own(&crate_.file_name().to_string_lossy()) {
-            let _ = fs::remove_dir_all(crate_.path());
         }
     }
 }

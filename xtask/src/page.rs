@@ -59,8 +59,9 @@ pub(crate) fn written(workspace: &Workspace) -> Result<Option<PathBuf>, String> 
     };
     let module = module(workspace, &compiler)?;
     let folder = workspace.target().join("page");
-    let mut page = workspace.cargo(&["run", "--release", "--package", "nanotap-bundle", "--"]);
-    page.arg(&workspace.root).arg(module).arg(&folder);
+    let mut page = workspace.program("nanotap-bundle")?;
+    page.arg("page").arg(&workspace.root);
+    page.arg(module).arg(&folder);
     must(&workspace.root, &mut page, "the page could not be written")?;
     Ok(Some(folder))
 }
@@ -74,8 +75,8 @@ fn compared(workspace: &Workspace, folder: &Path) -> Result<Tally, String> {
     let answers = workspace.target().join("web").join("answers");
     fs::create_dir_all(&answers)
         .map_err(|error| format!("cannot make {}: {error}", answers.display()))?;
-    let mut native = workspace.cargo(&["run", "--release", "--package", "nanotap-explorer"]);
-    native.args(["--example", "answers", "--", "xtask/bundle/requests.json"]);
+    let mut native = workspace.program("nanotap-bundle")?;
+    native.args(["answers", "xtask/bundle/requests.json"]);
     // One thread, as in a browser's worker: the times can be compared.
     native.arg(&answers).env("RAYON_NUM_THREADS", "1");
     must(&workspace.root, &mut native, "the program did not answer")?;

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use crate::process::{check, must, tests};
+use crate::process::{check, tests};
 use crate::tally::Tally;
 use crate::tools::{PYTHON, Workspace};
 use crate::{benches, book, constants, dist, figures, package, page, peers, wheel};
@@ -202,26 +202,18 @@ fn lint(workspace: &Workspace) -> Result<Tally, String> {
 /// Writes Python's functions from the schemas that the program prints, or checks that they are up
 /// to date.
 fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> {
-    // In one call with the Python package: each alone gives the crates that both use other features,
-    // so that everything would be compiled twice.
-    let mut build = workspace.cargo(&["build", "--release", "--package", "nanotap-cli"]);
-    build.args(["--package", "nanotap-python"]);
-    must(
-        &workspace.root,
-        &mut build,
-        "the program could not be built",
-    )?;
+    let program = workspace.program("nanotap")?;
     let mut command = Command::new(PYTHON);
     command
         .arg("crates/nanotap-python/signatures.py")
-        .arg(workspace.target().join("release").join("nanotap"))
+        .arg(program.get_program())
         .args(further);
     check(&workspace.root, &mut command)
 }
 
 /// Writes the pages of the reference from the program's tables.
 fn reference(workspace: &Workspace) -> Result<Tally, String> {
-    let mut command = workspace.cargo(&["run", "--release", "--package", "nanotap-book", "--"]);
+    let mut command = workspace.program("nanotap-book")?;
     command.arg(&workspace.root).arg("--reference");
     check(&workspace.root, &mut command)
 }

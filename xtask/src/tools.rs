@@ -68,6 +68,18 @@ impl Workspace {
         self.target.clone()
     }
 
+    /// A program of this workspace, compiled for release together with everything else: a package alone
+    /// gives the crates that it depends on other features, so that all of them would be compiled again.
+    ///
+    /// # Errors
+    /// If it cannot be built.
+    pub(crate) fn program(&self, name: &str) -> Result<Command, String> {
+        let mut build = self.cargo(&["build", "--release", "--workspace"]);
+        let failure = format!("{name} could not be built");
+        process::must(&self.root, &mut build, &failure)?;
+        Ok(Command::new(self.target.join("release").join(name)))
+    }
+
     /// Whether `cargo NAME` is installed.
     pub(crate) fn has_cargo_command(&self, name: &str) -> bool {
         process::output(&self.root, &mut self.cargo(&[name, "--version"])).is_some()

@@ -1,47 +1,34 @@
-//! Writes the page that needs no server: `nanotap-bundle REPOSITORY MODULE FOLDER`.
-//!
-//! The folder then has the page's files for any web server, with the module for machines that fuse
-//! multiply-adds and the one for those that do not, and `nanotap.html`, the same in one file.
+//! Writes the page that needs no server, and the answers that it is compared with:
+//! `nanotap-bundle page REPOSITORY MODULE FOLDER`, `nanotap-bundle answers REQUESTS FOLDER`.
 
 #![expect(
     clippy::disallowed_methods,
     reason = "it reads files of this repository"
 )]
 
+mod answers;
 mod bundle;
 mod exact;
+mod page;
 mod single;
 mod split;
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
-use nanotap::control::Control;
-use nanotap_explorer::Explorer;
-use serde_json::{Value, json};
-use sha2::{Digest as _, Sha256};
-
-use crate::exact::MultiplyAdd;
-
-/// The version of the page in its service worker, until the page is written.
-const VERSION: &str = "\"development\"";
-/// Its list of files until then.
-const FILES: &str = "[\"./\"]";
-const WORKER: &str = "service-worker.js";
-/// The first example of the page and what it holds, as in main.js.
-const FIRST: (&str, &str, &str) = ("dmt", "drive.setpoint", "0.8");
-
-/// Why the page was not written.
+/// Why something was not written.
 #[derive(Debug, thiserror::Error)]
-enum PageError {
+enum WriteError {
     #[error("{}: {error}", path.display())]
     File {
         path: PathBuf,
         error: std::io::Error,
+    },
+    #[error("{}: {error}", path.display())]
+    Requests {
+        path: PathBuf,
+        error: serde_json::Error,
     },
     #[error(transparent)]
     Module(#[from] exact::ModuleError),
@@ -49,15 +36,28 @@ enum PageError {
     Bundle(#[from] bundle::BundleError),
     #[error("{0} has no `{1}`")]
     Without(&'static str, String),
+    #[error(transparent)]
+    Explorer(#[from] nanotap::Error),
 }
 
 fn main() -> ExitCode {
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
-    let [repository, module, folder] = arguments.as_slice() else {
-        eprintln!("usage: nanotap-bundle REPOSITORY MODULE FOLDER");
-        return ExitCode::from(2);
+    let arguments: Vec<&Path> = arguments.iter().map(PathBuf::as_path).collect();
+    let written = match arguments.as_slice() {
+        [what, repository, module, folder] if what.as_os_str() == "page" => {
+            page::write(repository, module, folder)
+        }
+        [what, requests, folder] if what.as_os_str() == "answers" => {
+            answers::write(requests, folder)
+        }
+        _ => {
+            eprintln!(
+                "usage: nanotap-bundle page REPOSITORY MODULE FOLDER\n       nanotap-bundle answers REQUESTS FOLDER"
+            );
+            return ExitCode::from(2);
+        }
     };
-    match write(repository, module, folder) {
+    match written {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -66,126 +66,11 @@ fn main() -> ExitCode {
     }
 }
 
-fn write(repository: &Path, module: &Path, folder: &Path) -> Result<(), PageError> {
-    let source = repository.join("crates/nanotap-page/page");
-    let compiled = read(module)?;
-    let [fused, exact] = [MultiplyAdd::Kept, MultiplyAdd::Called]
-        .map(|multiply_add| exact::rewritten(&compiled, multiply_add));
-    let (fused, exact) = (fused?, exact?);
-    let [fused, exact] = [
-        split::split(&fused, is_late)?,
-        split::split(&exact, is_late)?,
-    ];
-    let mut texts = BTreeMap::new();
-    let listing = fs::read_dir(&source).map_err(of(&source))?;
-    for path in listing.flatten().map(|entry| entry.path()) {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let text = fs::read_to_string(&path).map_err(of(&path))?;
-        texts.insert(name.into_owned(), text);
-    }
-    let index = texts.entry(single::INDEX.into()).or_default();
-    let closed = format!("{}{}", first_states(), single::END);
-    *index = replaced(single::INDEX, index, single::END, &closed)?;
-    let whole = single::page(&texts, &fused.whole, &exact.whole)?;
-    // Another version of any file is another version of the page, which browsers then load anew.
-    let mut hash = Sha256::new();
-    for text in texts.values() {
-        hash.update(text);
-    }
-    hash.update(&fused.whole);
-    let version = format!("\"{}\"", STANDARD.encode(hash.finalize()));
-    let names = texts.keys().map(String::as_str);
-    let names = names.filter(|name| ![single::INDEX, WORKER].contains(name));
-    let files = json!(["./"].into_iter().chain(names).collect::<Vec<_>>()).to_string();
-    let worker = texts.entry(WORKER.into()).or_default();
-    *worker = replaced(WORKER, worker, VERSION, &version)?;
-    *worker = replaced(WORKER, worker, FILES, &files)?;
-    fs::create_dir_all(folder).map_err(of(folder))?;
-    let modules = [
-        ("nanotap.wasm", &fused.first),
-        ("nanotap-second.wasm", &fused.second),
-        ("nanotap-exact.wasm", &exact.first),
-        ("nanotap-exact-second.wasm", &exact.second),
-    ];
-    let texts = texts
-        .iter()
-        .map(|(name, text)| (name.as_str(), text.as_bytes()));
-    let modules = modules
-        .iter()
-        .map(|(name, bytes)| (*name, bytes.as_slice()));
-    for (name, bytes) in texts
-        .chain(modules)
-        .chain([("nanotap.html", whole.as_bytes())])
-    {
-        let path = folder.join(name);
-        fs::write(&path, bytes).map_err(of(&path))?;
-        println!("{:>9} bytes  {}", bytes.len(), path.display());
-    }
-    Ok(())
-}
-
-/// Crates of which the first view needs nothing but the forms of their studies.
-const LATE: [&str; 8] = [
-    "afm_files",
-    "afm_thermal",
-    "nanotap_fit",
-    "nanotap_images",
-    "nanotap_proof",
-    "nanotap_reconstruct",
-    "nanotap_scan",
-    "nanotap_surveys",
-];
-/// What makes the forms of studies, by parts of names: schemas, and defaults as JSON.
-const FORMS: [&str; 3] = ["8schemars", "7request6schema", "3ser9Serialize"];
-/// Crates whose functions for one type may be the same instructions as those for another, and then are one.
-const SHARED: [&str; 3] = ["alloc", "core", "std"];
-
-/// Whether the page loads a function on demand, by its mangled name, in which each crate has its length before it.
-fn is_late(name: &str) -> bool {
-    let (name, _) = name.split_once('.').unwrap_or((name, ""));
-    let place = |one: &str| {
-        let part = format!("{}{one}", one.len());
-        // At the end stands where a function of other types was compiled, which others may call as well.
-        name.strip_suffix(&part).unwrap_or(name).find(&part)
-    };
-    let first = |crates: &[&str]| crates.iter().filter_map(|one| place(one)).min();
-    let Some(late) = first(&LATE) else {
-        return false;
-    };
-    // The function's own crate comes first, those of its types after it.
-    !FORMS.iter().any(|part| name.contains(part))
-        && first(&SHARED).is_none_or(|shared| late < shared)
-}
-
-/// What the page shows before its module is there: the states of its first example, with the case that they
-/// are of as `caseText` in state.js writes it.
-fn first_states() -> String {
-    let (preset, key, value) = FIRST;
-    let case = json!({ "preset": preset, "set": [format!("{key}={value}")] });
-    let answer = Explorer::new(None).ok().and_then(|explorer| {
-        let request = json!({ "case": case }).to_string();
-        let control = Control::default();
-        let answer = explorer.answer("/api/states", request.as_bytes(), &control, &|_| {});
-        serde_json::from_slice::<Value>(&answer.bytes).ok()
-    });
-    let first = json!({ "of": json!([preset, [[key, value]]]).to_string(), "answer": answer });
-    format!("<script type=\"application/json\" id=\"first\">{first}</script>\n")
-}
-
-/// The text of a file with the first occurrence of a part replaced.
-fn replaced(name: &'static str, text: &str, part: &str, by: &str) -> Result<String, PageError> {
-    if text.contains(part) {
-        Ok(text.replacen(part, by, 1))
-    } else {
-        Err(PageError::Without(name, part.to_owned()))
-    }
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, PageError> {
+fn read(path: &Path) -> Result<Vec<u8>, WriteError> {
     fs::read(path).map_err(of(path))
 }
 
-fn of(path: &Path) -> impl FnOnce(std::io::Error) -> PageError {
+fn of(path: &Path) -> impl FnOnce(std::io::Error) -> WriteError {
     let path = path.to_owned();
-    move |error| PageError::File { path, error }
+    move |error| WriteError::File { path, error }
 }

@@ -7,7 +7,8 @@ use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec;
 use sha2::{Digest as _, Sha256};
 
-use crate::{PageError, bundle, replaced};
+use crate::page::replaced;
+use crate::{WriteError, bundle};
 
 /// The page.
 pub(crate) const INDEX: &str = "index.html";
@@ -27,7 +28,7 @@ pub(crate) fn page(
     texts: &BTreeMap<String, String>,
     fused: &[u8],
     exact: &[u8],
-) -> Result<String, PageError> {
+) -> Result<String, WriteError> {
     let text = |name: &str| texts.get(name).map_or("", String::as_str);
     let script = safe(&bundle::script(texts, "main.js")?);
     let style = text("style.css");
@@ -40,7 +41,7 @@ pub(crate) fn page(
     let own = index
         .split_once(POLICY)
         .and_then(|(_, rest)| rest.split_once(CLOSED));
-    let (own, _) = own.ok_or_else(|| PageError::Without(INDEX, POLICY.to_owned()))?;
+    let (own, _) = own.ok_or_else(|| WriteError::Without(INDEX, POLICY.to_owned()))?;
     let icon = STANDARD.encode(text("icon.svg"));
     let mut page = index.to_owned();
     for (part, by) in [

@@ -209,40 +209,6 @@ fn completions_and_manual_pages_contain_every_command() {
         .refused(&["--out there", "standard output"]);
 }
 
-/// On a terminal a line shows that the program works; it disappears with the result.
-#[cfg(unix)]
-#[test]
-fn long_work_reports_progress() {
-    // A chaotic motion of which only the periods are counted: on a faster machine more of them,
-    // until the work is long enough for a progress report.
-    let said = (0..10)
-        .map(|doubled| printed_on_a_terminal(200_000 << doubled))
-        .find(|text| text.contains("so far"))
-        .expect("a hundred million periods take longer than any machine keeps silent");
-    assert!(said.contains("lyapunov: 1 s so far"), "{said:?}");
-    assert!(said.contains("\r\u{1b}[K"), "{said:?}");
-}
-
-/// Output of `lyapunov` over this many periods on a terminal.
-#[cfg(unix)]
-fn printed_on_a_terminal(periods: u32) -> String {
-    use std::io::Read as _;
-
-    let folder = Folder::with_paper_case();
-    let terminal = nix::pty::openpty(None, None).unwrap();
-    let mut child = folder
-        .command(&["lyapunov", "case.toml", "--periods", &periods.to_string()])
-        .stdout(Stdio::null())
-        .stderr(terminal.slave)
-        .spawn()
-        .unwrap();
-    let mut text = Vec::new();
-    // Reading from a terminal whose program has ended gives an error.
-    let _ = std::fs::File::from(terminal.master).read_to_end(&mut text);
-    assert!(child.wait().unwrap().success());
-    String::from_utf8_lossy(&text).into_owned()
-}
-
 #[test]
 fn errors_quote_the_input() {
     let folder = Folder::with_paper_case();

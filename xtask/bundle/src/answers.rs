@@ -1,12 +1,8 @@
-//! Writes the answers to the requests of a file into a folder, with the seconds that each took: what
-//! `xtask/bundle/compare.mjs` compares with the answers of the WebAssembly module. A text `file:PATH` in a
-//! request stands for the content of a file; the requests with these are written as well.
+//! The program's answers to the requests of a file, with the seconds that each took: what `compare.mjs`
+//! compares with the answers of the WebAssembly module. A text `file:PATH` in a request stands for the content
+//! of a file; the requests with these are written as well.
 
-#![expect(
-    clippy::disallowed_methods,
-    reason = "it reads files of this repository"
-)]
-
+use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -15,23 +11,36 @@ use nanotap::control::Control;
 use nanotap_explorer::Explorer;
 use serde_json::{Map, Value};
 
+use crate::{WriteError, of, read};
+
 /// A second try of a quick request says how long it takes once everything is in memory.
 const QUICK: f64 = 1.5;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [requests, folder] = arguments.as_slice() else {
-        return Err("usage: answers REQUESTS.json FOLDER".into());
-    };
-    let requests: Vec<(String, String, Value)> = serde_json::from_slice(&std::fs::read(requests)?)?;
+/// Writes the answers to the requests in the file `requests` into `folder`.
+///
+/// # Errors
+/// If a file cannot be read or written, or `requests` is not a list of names, addresses and bodies.
+pub(crate) fn write(requests: &Path, folder: &Path) -> Result<(), WriteError> {
+    let bytes = read(requests)?;
+    let requests: Vec<(String, String, Value)> =
+        serde_json::from_slice(&bytes).map_err(|error| WriteError::Requests {
+            path: requests.to_owned(),
+            error,
+        })?;
     let explorer = Explorer::new(None)?;
     let mut times = Map::new();
     let requests: Vec<(String, String, Value)> = requests
         .into_iter()
         .map(|(name, path, body)| Ok((name, path, with_files(body)?)))
-        .collect::<std::io::Result<_>>()?;
-    let whole = serde_json::to_string(&requests)?;
-    std::fs::write(Path::new(folder).join("requests.json"), whole)?;
+        .collect::<Result<_, WriteError>>()?;
+    let keep = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        fs::write(&path, bytes).map_err(of(&path))
+    };
+    keep(
+        "requests.json",
+        serde_json::json!(requests).to_string().as_bytes(),
+    )?;
     for (name, path, body) in requests {
         let body = body.to_string();
         let lines = Mutex::new(String::new());
@@ -64,19 +73,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let mut bytes = lines.into_inner().unwrap_or_default().into_bytes();
         bytes.append(&mut answer.bytes);
-        std::fs::write(Path::new(folder).join(name.replace(' ', "-")), bytes)?;
+        keep(&name.replace(' ', "-"), &bytes)?;
         times.insert(name, least.into());
     }
-    let times = serde_json::to_string(&times)?;
-    std::fs::write(Path::new(folder).join("times.json"), times)?;
-    Ok(())
+    keep("times.json", Value::Object(times).to_string().as_bytes())
 }
 
 /// A request with the contents of its files.
-fn with_files(value: Value) -> std::io::Result<Value> {
+fn with_files(value: Value) -> Result<Value, WriteError> {
     Ok(match value {
         Value::String(text) => match text.strip_prefix("file:") {
-            Some(path) => std::fs::read_to_string(path)?.into(),
+            Some(path) => fs::read_to_string(path)
+                .map_err(of(Path::new(path)))?
+                .into(),
             None => text.into(),
         },
         Value::Array(values) => values
@@ -86,7 +95,7 @@ fn with_files(value: Value) -> std::io::Result<Value> {
         Value::Object(map) => map
             .into_iter()
             .map(|(name, value)| Ok((name, with_files(value)?)))
-            .collect::<std::io::Result<Map<_, _>>>()?
+            .collect::<Result<Map<_, _>, WriteError>>()?
             .into(),
         other => other,
     })

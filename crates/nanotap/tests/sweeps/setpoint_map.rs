@@ -98,7 +98,7 @@ fn the_states_are_those_of_each_case_alone() {
                 let (Some(distance), Some(phase)) = (distance, phase) else {
                     continue;
                 };
-                let options = serde_json::json!({"starts": 64});
+                let options = serde_json::json!({"starts": 24});
                 let options = serde_json::from_value(options).unwrap();
                 let there = alone.with(Key::GapTip, distance);
                 let found = AttractorsStudy::run(&there, &options, &control).unwrap();
@@ -123,10 +123,15 @@ fn the_states_are_those_of_each_case_alone() {
 #[test]
 fn a_point_does_not_depend_on_the_grid() {
     let case = lever(&["modes=1"]);
-    let map = window(&case, OVER, None, 1);
+    let map = window(
+        &case,
+        [OVER[0], "sample.hamaker=1.2e-19:1.2e-19:1"],
+        None,
+        1,
+    );
     let swapped = window(&case, [OVER[1], "sample.modulus=2GPa,20GPa,70GPa"], None, 2);
-    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        assert_eq!(points(&map)[row][column], points(&swapped)[2 * column][row]);
+    for column in [0, 1] {
+        assert_eq!(points(&map)[0][column], points(&swapped)[2 * column][1]);
     }
 }
 
@@ -135,14 +140,17 @@ fn a_point_does_not_depend_on_the_grid() {
 fn stiffness_and_forces_may_be_doubled() {
     let single = window(
         &lever(&["modes=1"]),
-        ["sample.modulus=5GPa,70GPa", "sample.hamaker=6.4e-20,1e-19"],
+        [
+            "sample.modulus=70GPa:70GPa:1",
+            "sample.hamaker=6.4e-20,1e-19",
+        ],
         None,
         2,
     );
     let double = window(
         &lever(&["modes=1", "cantilever.k=80 N/m", "tip.modulus=340 GPa"]),
         [
-            "sample.modulus=10GPa,140GPa",
+            "sample.modulus=140GPa:140GPa:1",
             "sample.hamaker=1.28e-19,2e-19",
         ],
         None,

@@ -137,6 +137,14 @@ class Answers:
         page.route(f"**{path}", give)
 
 
+def without_knocks(page: Any) -> Any:
+    """A page whose search for the smallest knock is not begun: it takes as long as all else that a view computes.
+    A test that shows it has a route of its own for it.
+    """
+    page.context.route("**/api/knock", lambda _: None)
+    return page
+
+
 def case_file(address: str, case: dict[str, Any]) -> str:
     return asked(address, "/api/export", {"case": case, "format": "toml"}).decode()
 

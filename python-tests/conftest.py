@@ -7,7 +7,15 @@ from typing import Any
 import nanotap
 import numpy as np
 import pytest
-from browsers import CHROMIUM, FLAGS, WAIT, address_of, limited, started
+from browsers import (
+    CHROMIUM,
+    FLAGS,
+    WAIT,
+    address_of,
+    limited,
+    started,
+    without_knocks,
+)
 
 # Files that take minutes, the longest first.
 LONG = ["test_page_states", "test_explorer", "test_page_plan", "test_page_numbers"]
@@ -111,7 +119,7 @@ def browser(playwright: Any) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def page(address: str, browser: Any) -> Any:
-    page = browser.new_page(viewport={"width": 1440, "height": 1000})
+    page = without_knocks(browser.new_page(viewport={"width": 1440, "height": 1000}))
     page.set_default_timeout(1000 * WAIT)
     page.complaints = []
     page.asked = []

@@ -1562,6 +1562,14 @@ def test_levers_are_compared_and_a_click_takes_one(page: Any, address: str) -> N
     assert page.is_hidden("#message")
 
 
+def test_a_motion_for_which_the_model_does_not_hold_says_so(address: str) -> None:
+    # The paper's case at Ω = 20, of which the terminal warns, too.
+    case = {"preset": "paper", "set": ["omega=20"]}
+    said = json.loads(asked(address, "/api/motion", {"case": case}))["remarks"]
+    assert any("would pass through the sample" in remark for remark in said), said
+    assert not any("pass through" in remark for remark in motion(address)["remarks"])
+
+
 def test_every_study_of_the_registry_has_a_form_and_a_report(address: str) -> None:
     studies = about(address)["studies"]
     names = [study["name"] for study in studies]
@@ -1587,6 +1595,9 @@ def test_every_study_of_the_registry_has_a_form_and_a_report(address: str) -> No
         assert "error" not in last, (study["name"], last)
         assert last["tables"], study["name"]
         assert last["command"].startswith(f"nanotap {study['name']} "), last
+        # What the terminal says beside the report.
+        if study["name"] in ("noise", "lyapunov"):
+            assert "this is the motion from rest" in last["words"], study["name"]
 
 
 def test_a_study_of_the_registry_is_computed_on_the_page(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsers import WAIT, asked, case_file, printed
+from browsers import WAIT, asked, case_file, printed, without_knocks
 from test_page_states import until
 
 LETTERS = 28  # CSS pixels of the smallest letters on a projector
@@ -19,7 +19,9 @@ LETTERS = 28  # CSS pixels of the smallest letters on a projector
 
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
-    page = browser.new_page(viewport={"width": 1280, "height": 720}, locale="en")
+    page = without_knocks(
+        browser.new_page(viewport={"width": 1280, "height": 720}, locale="en")
+    )
     page.set_default_timeout(1000 * WAIT)
     complaints: list[str] = []
     page.on("pageerror", lambda error: complaints.append(str(error)))

@@ -68,7 +68,7 @@ STUDIES = [
 
 @pytest.fixture(scope="module", params=STUDIES, ids=lambda study: "-".join(study[:2]))
 def study(request, tmp_path_factory):
-    """A result, the CSV file that the terminal writes, and whether there is a figure."""
+    """A result, the CSV file that the terminal writes, whether there is a figure, and what the terminal says."""
     name, file, keys, options, has_figure = request.param
     case = nanotap.Case.from_file(CASES / file, **keys)
     function = getattr(nanotap, name)
@@ -82,20 +82,31 @@ def study(request, tmp_path_factory):
         words += [f"--{flag}={one}" for one in listed]
     out = tmp_path_factory.mktemp(name) / "table.csv"
     command = [PROGRAM, name.replace("_", "-"), str(CASES / file), *words]
-    subprocess.run(
-        [*command, "--out", str(out), "--quiet"], check=True, capture_output=True
+    done = subprocess.run(
+        [*command, "--out", str(out)], check=True, capture_output=True, text=True
     )
-    return result, out.read_bytes(), has_figure
+    return result, out.read_bytes(), has_figure, done.stderr
 
 
 def test_the_csv_file_is_the_terminals(study, tmp_path):
-    result, written, _ = study
+    result, written, *_ = study
     nanotap.export.csv(result, tmp_path / "table.csv")
     assert (tmp_path / "table.csv").read_bytes() == written
 
 
+def test_the_terminal_says_what_the_result_says(study):
+    result, _, _, said = study
+    if "kind" in getattr(result, "attrs", ()):
+        pytest.skip("a dataset has attributes")
+    for message in result.messages:
+        assert " ".join(message.split()) in " ".join(said.split())
+    # Nothing that the terminal says of the motion is missing.
+    for word in ("this is the motion from rest", "Sader and Jarvis"):
+        assert (word in said) == any(word in message for message in result.messages)
+
+
 def test_the_first_table_is_the_terminals_file(study):
-    result, written, _ = study
+    result, written, *_ = study
     if "kind" in getattr(result, "attrs", ()):
         pytest.skip("a dataset has the rows of its grid")
     heads, *rows = csv.reader(written.decode().splitlines())
@@ -130,7 +141,7 @@ def test_every_variable_has_a_unit_and_a_name(study):
 
 
 def test_what_was_saved_is_drawn(study, tmp_path):
-    result, _, has_figure = study
+    result, _, has_figure, _ = study
     if not has_figure:
         with pytest.raises(TypeError, match="no figure"):
             result.plot()

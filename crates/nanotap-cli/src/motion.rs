@@ -10,13 +10,11 @@ use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{
-    Derivative, Harmonic, ObservableSet, Observables, OutOfRange, PhysicalMotion, Spectrum, Value,
-    time_series,
+    Derivative, Harmonic, ObservableSet, Observables, Spectrum, Value, time_series,
 };
 use nanotap::study::proof::ProofReport;
 use nanotap::study::simulate::Classification;
 
-use crate::output::Output;
 pub(crate) use crate::page::paragraph;
 use crate::text_table::{Align, Table};
 use crate::{number, style};
@@ -418,49 +416,4 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
         })
         .collect();
     list.join(", ")
-}
-
-/// Warns about a motion (`which` one, if there are several) whose result is doubtful: it leaves the
-/// range of the force law, another part of the beam than the tip would touch, or Hertz's stiffness
-/// is that of another depth.
-pub(crate) fn warn(
-    o: &Observables,
-    physical: Option<&PhysicalMotion>,
-    out_of_range: &[OutOfRange],
-    which: &str,
-    output: &Output,
-) {
-    for beyond in out_of_range {
-        output.warning(&format!("{which}{beyond}"));
-    }
-    let setting = physical.and_then(|motion| motion.setting.as_ref());
-    if let Some(mismatch) = setting.and_then(|setting| setting.hertz_mismatch) {
-        let depth = physical.map_or(f64::NAN, |motion| motion.observables.indentation);
-        output.warning(&format!(
-            "{which}Hertz's stiffness of {} was taken at an indentation of {}, but the tip sinks in by {}, \
-             where it is {}: give sample.indentation = \"{}\", or sample.law = \"hertz\" for the force itself",
-            Kind::Stiffness.format_digits(mismatch.assumed_stiffness, 4),
-            Kind::Length.format_digits(mismatch.assumed_indentation, 4),
-            Kind::Length.format_digits(depth, 4),
-            Kind::Stiffness.format_digits(mismatch.stiffness, 4),
-            Kind::Length.format_digits(depth, 3),
-        ));
-    }
-    let lowest = o.beam_clearance.zip(o.beam_clearance_xi);
-    let Some((height, xi)) = lowest.filter(|(height, _)| *height <= 0.0) else {
-        return;
-    };
-    let place = if xi > 0.999 {
-        "the end of the beam itself".to_owned()
-    } else {
-        format!(
-            "the beam at ξ = {} of its length",
-            number::significant(xi, 3)
-        )
-    };
-    output.warning(&format!(
-        "{which}{place} would pass through the sample (height {} g₀): the model, in which only the tip touches, \
-         does not hold for this motion (the paper's Fig. 2f)",
-        number::significant(height, 4)
-    ));
 }

@@ -3,6 +3,7 @@
 use std::io::{BufWriter, ErrorKind, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nanotap::case::physical::{Remark, Severity};
 use nanotap::error::ErrorDocument;
 use nanotap::study::registry::Document;
 use schemars::JsonSchema;
@@ -100,10 +101,15 @@ impl Output {
         }
     }
 
-    /// Prints the notes of a report, as [`note`](Self::note); its JSON document holds them itself.
-    pub(crate) fn notes(&self, notes: &[String]) {
-        for note in notes.iter().filter(|_| !self.json) {
-            self.note(note);
+    /// Prints the remarks on a report: its notes as [`note`](Self::note), unless its JSON document holds them,
+    /// and its warnings.
+    pub(crate) fn remarks(&self, remarks: &[Remark]) {
+        for remark in remarks {
+            match remark.severity {
+                Severity::Warning => self.warning(&remark.text),
+                Severity::Note if self.json => {}
+                Severity::Note => self.note(&remark.text),
+            }
         }
     }
 

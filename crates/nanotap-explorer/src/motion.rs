@@ -3,6 +3,7 @@
 use std::sync::PoisonError;
 
 use nanotap::ErrorKind;
+use nanotap::case::physical::Remark;
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
@@ -10,7 +11,8 @@ use nanotap::figure::contact::contact_figure;
 use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure};
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Dimension, OBSERVABLES, Observable, Observables};
+use nanotap::observe::{Dimension, OBSERVABLES, Observable, Observables, PhysicalMotion};
+use nanotap::study::model_limits::limits_of;
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use nanotap::study::registry::Study as _;
 use nanotap::study::request::read;
@@ -62,6 +64,18 @@ impl Motion {
             }
             Err(error) => Err(ApiError::of(error)),
         }
+    }
+
+    /// Where the model does not hold for it.
+    fn remarks(&self, case: &Case) -> Vec<Remark> {
+        let beyond = match self {
+            Self::Orbit(orbit) => &orbit.out_of_range,
+            Self::Run(run) => &run.out_of_range,
+        };
+        let physical = case
+            .physical()
+            .map(|of| PhysicalMotion::alone(self.observables(), None, of));
+        limits_of(self.observables(), physical.as_ref(), beyond)
     }
 
     pub(crate) fn observables(&self) -> &Observables {
@@ -150,7 +164,8 @@ pub(crate) fn answer(
     if let (Some(_), Some(state)) = (&request.from, &start.state) {
         said.start = Start::text(start.period, state);
     }
-    let remarks: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
+    let remarks = motion.remarks(&case).into_iter().chain(case.remarks());
+    let remarks: Vec<String> = remarks.map(|remark| remark.text).collect();
     Ok(json!({
         "title": case.title(),
         "summary": motion.words(),

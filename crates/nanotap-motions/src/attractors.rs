@@ -1,6 +1,7 @@
 //! Coexisting attractors and their observables, found by a census: a sampling of initial states.
 
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::{
     AttractorKind, Census, CensusEnd, CensusOptions, CheckedStart, ClassifyOptions, Control,
     ExactOutcome, Fraction, OrbitSearch, PeriodicOrbit, Stability, StartBox, StartOutcome,
@@ -13,6 +14,7 @@ use serde::Serialize;
 
 use crate::approach::states_near;
 use crate::figure::attractors::attractors_figure;
+use crate::model_limits::limits_of;
 use crate::orbit::{OrbitReport, report, spectral_radius};
 use crate::proof::Prover;
 use crate::simulate::{Classification, largest_exponent, orbit_evidence, torus_evidence};
@@ -903,6 +905,26 @@ impl Study for AttractorsStudy {
             report,
             &case.units(),
         ))
+    }
+
+    fn remarks(_: &Case, report: &Attractors) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        for (k, attractor) in report.attractors.iter().enumerate() {
+            let physical = attractor.physical.as_ref();
+            let orbit = attractor.orbit.iter();
+            let orbit = orbit.map(|orbit| (&orbit.observables, &*orbit.out_of_range));
+            let other = attractor.non_periodic.iter();
+            let other = other.map(|motion| (&motion.observables, &[][..]));
+            let limits = orbit
+                .chain(other)
+                .flat_map(|(observables, beyond)| limits_of(observables, physical, beyond));
+            remarks.extend(limits.map(|remark| Remark {
+                text: format!("attractor {}: {}", k + 1, remark.text),
+                ..remark
+            }));
+        }
+        remarks.extend(Remark::notes(&report.notes));
+        remarks
     }
 
     fn compute(

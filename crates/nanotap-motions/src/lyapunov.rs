@@ -1,5 +1,6 @@
 //! Lyapunov spectrum and Poincaré section of any motion.
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::{
     ClassifyOptions, LyapunovSpectrum, PeriodicOrbit, StroboscopicMap as _, classify,
     lyapunov_spectrum,
@@ -416,6 +417,10 @@ impl Study for LyapunovStudy {
 
     fn figure(case: &Case, report: &LyapunovReport) -> Option<Figure> {
         Some(section_figure(&case.model().ok()?, report, &case.units()))
+    }
+
+    fn remarks(_: &Case, report: &LyapunovReport) -> Vec<Remark> {
+        Remark::notes(&report.notes)
     }
 
     fn compute(

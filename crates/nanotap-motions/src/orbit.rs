@@ -1,6 +1,7 @@
 //! Periodic orbits by Newton's method, with stability and observables.
 
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_case::physical::Remark;
 use std::collections::BTreeMap;
 
 use nalgebra::DVector;
@@ -17,6 +18,7 @@ use serde::Serialize;
 use crate::approach::SETPOINT_PERIODS;
 use crate::figure::motion::orbit_figure;
 use crate::initial_state::initial_state_note;
+use crate::model_limits::limits_of;
 use crate::proof::{ProofReport, Prover};
 use crate::simulate::{NamedMotion, starting_state};
 use crate::upset::{Knocks, upset};
@@ -633,6 +635,13 @@ impl Study for OrbitStudy {
             &report.motion,
             &case.units(),
         ))
+    }
+
+    fn remarks(_: &Case, report: &InSi<OrbitReport>) -> Vec<Remark> {
+        let (orbit, physical) = (&report.motion, report.physical.as_ref());
+        let mut remarks = limits_of(&orbit.observables, physical, &orbit.out_of_range);
+        remarks.extend(Remark::notes(&orbit.notes));
+        remarks
     }
 
     fn compute(

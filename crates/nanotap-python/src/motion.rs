@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
+use nanotap::case::physical::Remark;
 use nanotap::control::Control;
 use nanotap::frame::Frame;
 use nanotap::map::MAX_NUMBERS;
@@ -67,6 +68,10 @@ impl Answer for ModesAnswer {
 
     fn figure(&self) -> Option<Figure> {
         self.kept.figure()
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        self.kept.remarks()
     }
 }
 
@@ -187,6 +192,13 @@ impl Answer for MotionAnswer {
         match &self.report {
             MotionReport::Run(run) => SimulateStudy::figure(&self.case, run),
             MotionReport::Orbit(orbit) => OrbitStudy::figure(&self.case, orbit),
+        }
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        match &self.report {
+            MotionReport::Run(run) => SimulateStudy::remarks(&self.case, run),
+            MotionReport::Orbit(orbit) => OrbitStudy::remarks(&self.case, orbit),
         }
     }
 }

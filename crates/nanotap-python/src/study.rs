@@ -69,6 +69,14 @@ impl ReportCore {
         })
     }
 
+    /// What the terminal prints beside the report.
+    #[getter]
+    fn messages(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.with(py, |answer| {
+            Ok(answer.remarks().iter().map(ToString::to_string).collect())
+        })
+    }
+
     /// The CSV file that the terminal writes; `None` if there is none.
     #[getter]
     fn csv(&self, py: Python<'_>) -> PyResult<Option<String>> {

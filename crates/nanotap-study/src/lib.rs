@@ -24,6 +24,7 @@ use std::fmt::Debug;
 
 use nanotap_case::Case;
 use nanotap_case::document::CaseDocument;
+use nanotap_case::physical::Remark;
 use nanotap_dataset::{Schema, Store, StoreError, Work, WorkError};
 use nanotap_dynamics::Control;
 use nanotap_error::Error;
@@ -70,6 +71,12 @@ pub trait Study {
     /// The figure of a report on `case`, if it has one.
     fn figure(_case: &Case, _report: &Self::Report) -> Option<Figure> {
         None
+    }
+
+    /// What front ends say beside a report on `case`: where the model does not hold, what is missing, and what
+    /// was assumed.
+    fn remarks(_case: &Case, _report: &Self::Report) -> Vec<Remark> {
+        Vec::new()
     }
 
     /// Computes the report of a `case` that `control` cancels: implements [`run`](Self::run).
@@ -127,6 +134,12 @@ pub trait DatasetStudy {
 
     /// The tables of a summary, as front ends show them; without any, its fields.
     fn frames(_: &Self::Report) -> Vec<Frame<'_>> {
+        Vec::new()
+    }
+
+    /// What front ends say beside a summary: where the model does not hold, what is missing, and what was
+    /// assumed.
+    fn remarks(_: &Self::Report) -> Vec<Remark> {
         Vec::new()
     }
 

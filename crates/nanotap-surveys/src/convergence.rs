@@ -1,5 +1,6 @@
 //! Convergence of a motion with the number of modes N = 1 … K.
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 use nanotap_figures::Figure;
 use schemars::JsonSchema;
@@ -351,6 +352,10 @@ impl Study for ConvergenceStudy {
 
     fn figure(case: &Case, report: &Convergence) -> Option<Figure> {
         Some(convergence_figure(report, &case.units()))
+    }
+
+    fn remarks(_: &Case, report: &Convergence) -> Vec<Remark> {
+        Remark::notes(&report.notes)
     }
 
     fn compute(

@@ -315,12 +315,6 @@ pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
             table.push(entry);
         }
     }
-    // Kinds of one dimension, as a force per length and an energy per area, are read and shown alike.
-    for entry in &mut table {
-        if let Takes::Quantity(kind) = &mut entry.takes {
-            *kind = kind.dimension().kind().unwrap_or(*kind);
-        }
-    }
     table
 });
 

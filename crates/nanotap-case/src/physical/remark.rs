@@ -24,6 +24,16 @@ pub struct Remark {
 }
 
 impl Remark {
+    /// A note for each text.
+    pub fn notes(texts: &[String]) -> Vec<Self> {
+        texts.iter().map(Self::note).collect()
+    }
+
+    /// A warning for each text.
+    pub fn warnings(texts: &[String]) -> Vec<Self> {
+        texts.iter().map(Self::warning).collect()
+    }
+
     /// Creates a note: an assumption made or a quantity inferred.
     pub fn note(text: impl Into<String>) -> Self {
         Self {

@@ -61,15 +61,7 @@ pub(super) fn print<S: Study<Report = ApproachReport>>(
     if report.cancelled {
         output.warning("stopped before it was done");
     }
-    for limit in &report.limits {
-        output.warning(limit);
-    }
-    if report.beam_clearance.is_some_and(|height| height <= 0.0) {
-        output.warning(
-            "at the nearest distance another part of the beam than the tip would pass through the \
-             sample: the model does not hold there",
-        );
-    }
+    output.remarks(&S::remarks(case, &report));
     study.write(case, &report)?;
     if let Some(branches) = &mut report.branches {
         points.shorten(branches, output);

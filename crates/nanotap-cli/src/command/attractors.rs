@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::study::Study as _;
 use nanotap::study::attractors::{
     Attractors, AttractorsStudy, CheckReport, EndReport, UnseenReport,
 };
@@ -33,18 +34,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if found.cancelled {
         output.warning("stopped before all starts were done: the fractions are of what was done");
     }
-    for (k, attractor) in found.attractors.iter().enumerate() {
-        let of_orbit = attractor.orbit.as_ref();
-        let of_orbit = of_orbit.map(|orbit| (&orbit.observables, orbit.out_of_range.as_slice()));
-        let non_periodic = attractor.non_periodic.as_ref();
-        let non_periodic = non_periodic.map(|motion| (&motion.observables, &[][..]));
-        for (observables, beyond) in of_orbit.into_iter().chain(non_periodic) {
-            let which = format!("attractor {}: ", k + 1);
-            let physical = attractor.physical.as_ref();
-            motion::warn(observables, physical, beyond, &which, output);
-        }
-    }
-    output.notes(&found.notes);
+    output.remarks(&AttractorsStudy::remarks(&case, &found));
     output.study(&case, &found, |found| text(&case, found))
 }
 

@@ -38,10 +38,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let report = calibrate_file(&arguments.file, &options)?;
     arguments.out.write(|| report.spectrum_table().csv())?;
     arguments.plot.draw(|| report.figure())?;
-    output.notes(&report.notes);
-    for warning in &report.calibration.warnings {
-        output.warning(&warning.to_string());
-    }
+    output.remarks(&report.remarks());
     output.result(&report, text)
 }
 

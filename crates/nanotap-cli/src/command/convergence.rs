@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
+use nanotap::study::Study as _;
 use nanotap::study::convergence::{Convergence, ConvergenceStudy};
 
 use crate::failure::Failure;
@@ -20,7 +21,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (request, case) = arguments.read(output)?;
     let result = progress::study::<ConvergenceStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.write(&case, &result)?;
-    output.notes(&result.notes);
+    output.remarks(&ConvergenceStudy::remarks(&case, &result));
     output.study(&case, &result, |result| text(&case, result))
 }
 

@@ -7,6 +7,7 @@ use nanotap::dataset::Share;
 use nanotap::figure::fit::{FitMaps, fit_figure};
 use nanotap::files;
 use nanotap::study::DatasetStudy as _;
+use nanotap::study::Study as _;
 use nanotap::study::fit::{
     FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedForceCurve, RivalParameter,
     force_curve_table,
@@ -114,12 +115,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if report.cancelled {
         output.warning("stopped before it was done");
     }
-    for done in &report.preparation {
-        output.note(done);
-    }
-    for remark in &report.remarks {
-        output.warning(remark);
-    }
+    output.remarks(&FitStudy::remarks(&case, &report));
     let written = Written {
         path: arguments.out.as_ref(),
         report: &report,

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
+use nanotap::study::Study as _;
 use nanotap::study::approach::Way;
 use nanotap::study::force_curve::{ForceCurveReport, ForceCurveStudy, StaticJump, Waveform};
 
@@ -26,9 +27,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
     let report = progress::study::<ForceCurveStudy>(&case, &request, &arguments.threads)?;
-    for warning in &report.warnings {
-        output.warning(warning);
-    }
+    output.remarks(&ForceCurveStudy::remarks(&case, &report));
     arguments.study.write(&case, &report)?;
     output.study(&case, &report, |report| text(&case, report))
 }

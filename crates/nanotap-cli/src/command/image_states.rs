@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::physical::Kind;
+use nanotap::study::Study as _;
 use nanotap::study::image_states::{ImageData, ImageStatesReport, ImageStatesStudy};
 
 use crate::failure::Failure;
@@ -53,9 +54,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     options.data = ImageData::read(&files)?;
     let report = progress::study::<ImageStatesStudy>(&case, &options, &arguments.threads)?;
     arguments.study.write(&case, &report)?;
-    for warning in &report.warnings {
-        output.warning(warning);
-    }
+    output.remarks(&ImageStatesStudy::remarks(&case, &report));
     output.study(&case, &report, |report| text(&case, report))
 }
 

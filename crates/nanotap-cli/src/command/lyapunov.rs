@@ -1,5 +1,6 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
+use nanotap::study::Study as _;
 use nanotap::study::lyapunov::{ExponentSource, LyapunovReport, LyapunovStudy};
 
 use crate::failure::Failure;
@@ -25,7 +26,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output.warning("the section is empty: the motion begins no contact");
     }
     arguments.write(&case, &report)?;
-    output.notes(&report.notes);
+    output.remarks(&LyapunovStudy::remarks(&case, &report));
     output.study(&case, &report, |report| text(&case, report))
 }
 

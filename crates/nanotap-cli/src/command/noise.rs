@@ -3,6 +3,7 @@
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::figure::noise::noise_figure;
+use nanotap::study::Study as _;
 use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -39,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let report = progress::study::<NoiseStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| report.spectrum.table().csv())?;
     arguments.plot.draw(|| noise_figure(&report))?;
-    output.notes(&report.notes);
+    output.remarks(&NoiseStudy::remarks(&case, &report));
     output.study(&case, &report, |report| text(&case, report))
 }
 

@@ -9,6 +9,7 @@ use nanotap::case::units::Units;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{ObservableSet, time_series};
+use nanotap::study::Study as _;
 use nanotap::study::orbit::{
     MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy, harmonic_table,
 };
@@ -74,15 +75,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| orbit_figure(&model, orbit, &case.units()))?;
-    let beyond = &orbit.out_of_range;
-    motion::warn(
-        &orbit.observables,
-        found.physical.as_ref(),
-        beyond,
-        "",
-        output,
-    );
-    output.notes(&orbit.notes);
+    output.remarks(&OrbitStudy::remarks(&case, found));
     output.study(&case, found, |found| {
         text(&case, &model, &found.motion, request.observables)
     })

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nanotap::study::Study as _;
 use nanotap::study::reconstruct::{ReconstructMethod, ReconstructReport, ReconstructStudy};
 
 use crate::arguments::measured;
@@ -41,9 +42,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     options.data = measured(&arguments.data, &arguments.also, None, "reconstruct")?;
     let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
     arguments.study.write(&case, &report)?;
-    for remark in &report.remarks {
-        output.warning(remark);
-    }
+    output.remarks(&ReconstructStudy::remarks(&case, &report));
     output.study(&case, &report, |report| text(&case, report))
 }
 

@@ -7,6 +7,7 @@ use clap::Args;
 use nanotap::dataset::Share;
 use nanotap::figure::scan::scan_figure;
 use nanotap::study::DatasetStudy as _;
+use nanotap::study::Study as _;
 use nanotap::study::scan::report::LoopReport;
 use nanotap::study::scan::{CHANNELS, Method, ScanLines, ScanOptions, ScanReport, ScanStudy};
 
@@ -70,9 +71,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.plot.check()?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
     let report = progress::study::<ScanStudy>(&case, &request, &arguments.threads)?;
-    for warning in &report.warnings {
-        output.warning(warning);
-    }
+    output.remarks(&ScanStudy::remarks(&case, &report));
     if let Some(path) = &arguments.out {
         if ending == Some("gsf") {
             for channel in CHANNELS {
@@ -111,8 +110,8 @@ fn dataset(
         |store| Ok(scan_figure(&ScanLines::report(store)?)),
         output,
     )?;
-    for warning in done.summary.iter().flat_map(|report| &report.warnings) {
-        output.warning(warning);
+    if let Some(report) = &done.summary {
+        output.remarks(&ScanLines::remarks(report));
     }
     output.study(&case, &done, |done| {
         done.text(case.title(), |report| text(&case, report))

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
+use nanotap::study::Study as _;
 use nanotap::study::fixed_step::FixedStepRun;
 use nanotap::study::one_shot::OneShot;
 use nanotap::study::simulate::{
@@ -37,25 +38,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             report.sample(&case, &request, usize::MAX, row)
         })?;
     }
-    match &report {
-        SimulateReport::OneShot(report) => {
-            let (seen, physical) = (&report.motion.observables, report.physical.as_ref());
-            motion::warn(seen, physical, &report.motion.out_of_range, "", output);
-        }
-        SimulateReport::Exact(report) => {
-            let run = &report.motion;
-            let (seen, physical) = (&run.observables, report.physical.as_ref());
-            motion::warn(seen, physical, &run.out_of_range, "", output);
-            output.notes(&run.notes);
-        }
-        SimulateReport::FixedStep(run) => {
-            arguments.out.write(|| run.curve_table(units).csv())?;
-            output.notes(&run.notes);
-            output.note(
-                "rk4 is the paper's method, kept to show the effect of a time step; its results are not certified",
-            );
-        }
+    if let SimulateReport::FixedStep(run) = &report {
+        arguments.out.write(|| run.curve_table(units).csv())?;
     }
+    output.remarks(&SimulateStudy::remarks(&case, &report));
     output.study(&case, &report, |report| match report {
         SimulateReport::Exact(run) => text(&case, &run.motion, &request),
         SimulateReport::FixedStep(run) => rk4_text(&case, run),

@@ -71,14 +71,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let request = Value::Object(arguments.given.clone());
     let any_distance = (entry.any_distance)(&request)?;
     let case = GivenCase::for_study(&arguments.case, any_distance, output)?;
-    let document = progress::watched(entry.name, entry.counted, entry.partial, |control| {
-        entry.document(&case, request, control)
+    let answer = progress::watched(entry.name, entry.counted, entry.partial, |control| {
+        entry.answer(&case, request, control)
     })?;
-    let document: Value = serde_json::from_str(&document)
+    let document: Value = serde_json::from_str(&answer.document()?)
         .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
     if document["cancelled"] == true {
         output.warning("stopped before it was done");
     }
+    output.remarks(&answer.remarks());
     output.result(&document, text)
 }
 

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 use nanotap::case::Key;
 use nanotap::figure::sweep::{figure, response};
+use nanotap::study::DatasetStudy as _;
 use nanotap::study::sweep::{Follow, Over, Summary, SweepOptions, SweepStudy};
 
 use crate::arguments::{CaseArguments, PlotArgument};
@@ -88,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output,
     )?;
     if let Some(summary) = &done.summary {
-        output.notes(&summary.notes);
+        output.remarks(&SweepStudy::remarks(summary));
     }
     output.study(&case, &done, |done| text(&case, &options, &over, done))
 }

@@ -3,6 +3,7 @@
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
 use nanotap::figure::approach::approach_figure;
+use nanotap::study::Study as _;
 use nanotap::study::approach::{ApproachReport, ApproachStudy};
 use nanotap_figures::Figure;
 use serde_json::json;
@@ -42,6 +43,7 @@ impl Studied<'_> {
                 }),
                 figure: Some(drawn.figure),
                 words: progress(points, finest, "distances each way"),
+                remarks: ApproachStudy::remarks(&case, &found),
                 studies: &[("approach", &options)],
                 tables: vec![report::of_frame(
                     "motions on the curve",

@@ -34,19 +34,16 @@ impl Studied<'_> {
         let options: CalibrateOptions = read(Value::Object(named.clone()))?;
         let found = calibrate_bytes(name, bytes, &options)?;
         let calibration = &found.calibration;
-        let mut words = format!(
+        let words = format!(
             "Fit of {} bins from {} to {}",
             calibration.bins,
             Kind::Frequency.format_digits(calibration.range[0], 4),
             Kind::Frequency.format_digits(calibration.range[1], 4)
         );
-        let warnings = calibration.warnings.iter().map(ToString::to_string);
-        for note in found.notes.iter().cloned().chain(warnings) {
-            let _ = write!(words, "; {note}");
-        }
         self.hand(Stage {
             figure: Some(found.figure()),
             words,
+            remarks: found.remarks(),
             tables: vec![report::of_frame("", &found.estimate_table())],
             commands: Some(commands(name, &named)),
             form: Some(CALIBRATE),

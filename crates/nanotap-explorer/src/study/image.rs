@@ -4,6 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::file::scan_table;
 use nanotap::case::quantity::Kind;
 use nanotap::figure::scan::scan_figure;
+use nanotap::study::Study as _;
 use nanotap::study::scan::{ScanReport, ScanStudy};
 use serde_json::{Map, Value, json};
 
@@ -27,6 +28,7 @@ impl Studied<'_> {
             figure: Some(scan_figure(&scanned)),
             clicks: json!({}),
             words: verdict(&scanned),
+            remarks: ScanStudy::remarks(&case, &scanned),
             studies: &[("scan", &options)],
             scan: Self::scan_table(&case, surface),
             tables: vec![report::of_frame("lines", &scanned.line_table())],

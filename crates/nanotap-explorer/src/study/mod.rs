@@ -18,6 +18,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use nanotap::case::Case;
+use nanotap::case::physical::Remark;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::model::Model;
@@ -109,6 +110,8 @@ struct Stage<'a> {
     figure: Option<Figure>,
     clicks: Value,
     words: String,
+    /// What follows these words.
+    remarks: Vec<Remark>,
     /// Names and requests of the studies in its figure.
     studies: &'a [Computed<'a>],
     /// The equivalent command and lines of Python, if they take no case.
@@ -230,6 +233,10 @@ impl Studied<'_> {
         let commands = stage.studies.iter().map(command);
         let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
         let mut words = stage.words;
+        for remark in &stage.remarks {
+            words.push_str("; ");
+            words.push_str(&remark.text);
+        }
         let mut figure = stage.figure;
         if let (Some(own), Some(pinned)) = (&mut figure, &self.request.pinned)
             && !over_pinned(own, pinned)

@@ -52,6 +52,7 @@ impl Studied<'_> {
         self.hand(Stage {
             figure: answer.figure(),
             words: entry.about.to_owned(),
+            remarks: answer.remarks(),
             studies: &[(name, &options)],
             tables,
             ..Stage::default()

@@ -16,6 +16,7 @@ use afm_thermal::{
     Window,
 };
 use nanotap_case::input::{self, MAX_TABLE_BYTES, Origin};
+use nanotap_case::physical::Remark;
 use nanotap_case::table::Table;
 use nanotap_error::Error;
 use nanotap_figures::Figure;
@@ -215,6 +216,14 @@ impl CalibrateReport {
     /// The figure.
     pub fn figure(&self) -> Figure {
         calibrate_figure(self)
+    }
+
+    /// What was taken where nothing is stated, and what is doubtful.
+    pub fn remarks(&self) -> Vec<Remark> {
+        let mut remarks = Remark::notes(&self.notes);
+        let warnings = self.calibration.warnings.iter();
+        remarks.extend(warnings.map(|warning| Remark::warning(warning.to_string())));
+        remarks
     }
 }
 

@@ -54,6 +54,7 @@ mod suggestions;
 pub(crate) mod terms;
 pub mod thin;
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 
 use crate::figure::fit::fit_figure;
@@ -216,6 +217,11 @@ impl Study for FitStudy {
 
     fn figure(_: &Case, report: &FitReport) -> Option<Figure> {
         Some(fit_figure(report))
+    }
+
+    fn remarks(_: &Case, report: &FitReport) -> Vec<Remark> {
+        let prepared = Remark::notes(&report.preparation).into_iter();
+        prepared.chain(Remark::warnings(&report.remarks)).collect()
     }
 
     fn compute(

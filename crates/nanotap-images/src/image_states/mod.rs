@@ -12,6 +12,7 @@ mod image;
 mod report;
 mod steps;
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 use nanotap_figures::Figure;
 use schemars::JsonSchema;
@@ -198,6 +199,10 @@ impl Study for ImageStatesStudy {
 
     fn figure(_: &Case, report: &ImageStatesReport) -> Option<Figure> {
         Some(image_states_figure(report))
+    }
+
+    fn remarks(_: &Case, report: &ImageStatesReport) -> Vec<Remark> {
+        Remark::warnings(&report.warnings)
     }
 
     fn compute(

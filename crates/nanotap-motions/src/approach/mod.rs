@@ -23,6 +23,7 @@ mod frames;
 pub(crate) mod quasistatic;
 mod ramp;
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::{ContinuationOptions, Control, PeriodicOrbit};
 use nanotap_figures::Figure;
 use schemars::JsonSchema;
@@ -275,6 +276,21 @@ pub struct ApproachReport {
     /// Frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<ModulationReport>,
+}
+
+impl ApproachReport {
+    /// What is missing, and where the model does not hold.
+    pub(crate) fn remarks(&self) -> Vec<Remark> {
+        let touches = self.beam_clearance.is_some_and(|height| height <= 0.0);
+        let touches = touches.then(|| {
+            Remark::warning(
+                "at the nearest distance another part of the beam than the tip would pass through the sample: the \
+                 model does not hold there",
+            )
+        });
+        let limits = Remark::warnings(&self.limits).into_iter();
+        limits.chain(touches).collect()
+    }
 }
 
 /// Computes an approach and retract curve.
@@ -769,6 +785,10 @@ impl Study for ApproachStudy {
 
     fn figure(case: &Case, report: &ApproachReport) -> Option<Figure> {
         Some(approach_figure(report, &case.units()))
+    }
+
+    fn remarks(_: &Case, report: &ApproachReport) -> Vec<Remark> {
+        report.remarks()
     }
 
     fn compute(

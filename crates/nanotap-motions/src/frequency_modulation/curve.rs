@@ -1,6 +1,7 @@
 //! Approach and retract curves under frequency modulation.
 
 use nanotap_dynamics::Control;
+use nanotap_quantity::number::significant;
 
 use super::average::sader_jarvis;
 use super::walk::{HeldWalk, Stepped};
@@ -158,9 +159,10 @@ fn curve(
         report(total, total);
     }
     // Of one least distance there is nothing to invert.
-    if closest.is_none() {
-        invert(&mut table, &free);
-    }
+    let limits = match closest {
+        None => invert(&mut table, &free),
+        Some(_) => None,
+    };
     for point in &mut table {
         curve.add_si(point);
     }
@@ -181,7 +183,7 @@ fn curve(
         coexisting: Vec::new(),
         branches: None,
         cancelled: control.is_cancelled(),
-        limits: Vec::new(),
+        limits: limits.into_iter().collect(),
         parameter_unit: case.parameter_unit(case.gap_key()),
         physical: None,
         modulation: Some(ModulationReport {
@@ -465,9 +467,13 @@ fn excess(point: &ApproachPoint, shift: f64) -> f64 {
     point.modulation.map_or(f64::NAN, |m| m.frequency_shift) - shift
 }
 
+/// Part of the largest force by which more rows may change the forces found from the shifts.
+const CHANGED: f64 = 0.01;
+
 /// Adds the force that follows from the shifts of each direction by the formula of Sader and
-/// Jarvis.
-fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
+/// Jarvis, and says so if more rows would give another one.
+fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) -> Option<String> {
+    let mut changed = 0.0_f64;
     for way in [Way::Approach, Way::Retract] {
         let of_way = |p: &&mut ApproachPoint| p.way == way;
         let curve: Vec<(f64, f64)> = table
@@ -479,11 +485,39 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
             continue;
         }
         let forces = sader_jarvis(&curve, free.swing, free.stiffness);
+        changed = changed.max(by_more_rows(&curve, &forces, free));
         for (point, force) in table.iter_mut().filter(of_way).zip(forces) {
             if let Some(modulation) = &mut point.modulation {
                 modulation.sader_jarvis_force = Some(force);
             }
         }
+    }
+    (changed > CHANGED).then(|| {
+        format!(
+            "the force by the formula of Sader and Jarvis depends on the number of rows: more of them may change \
+             it by some {} % of the largest one",
+            significant(100.0 * changed, 1)
+        )
+    })
+}
+
+/// By what part of the largest force more rows may change the forces, estimated from every second row.
+fn by_more_rows(curve: &[(f64, f64)], forces: &[f64], free: &FreeOscillation) -> f64 {
+    let half: Vec<(f64, f64)> = curve.iter().copied().step_by(2).collect();
+    if half.len() < 3 {
+        return f64::INFINITY;
+    }
+    let coarser = sader_jarvis(&half, free.swing, free.stiffness);
+    let pairs = coarser.iter().zip(forces.iter().step_by(2));
+    let apart = pairs.fold(0.0_f64, |apart, (a, b)| apart.max((a - b).abs()));
+    let largest = forces
+        .iter()
+        .fold(0.0_f64, |most, force| most.max(force.abs()));
+    // Half the distance between rows leaves a quarter of the error, so that a third of the change remains.
+    if largest > 0.0 {
+        apart / (3.0 * largest)
+    } else {
+        0.0
     }
 }
 

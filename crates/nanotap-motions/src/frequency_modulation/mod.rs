@@ -20,6 +20,7 @@ pub use curve::frequency_modulation;
 pub use free::FreeOscillation;
 pub use held::{Driven, Held, HeldOrbit};
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 use nanotap_figures::Figure;
 use schemars::JsonSchema;
@@ -309,6 +310,10 @@ impl Study for FrequencyModulationStudy {
 
     fn figure(case: &Case, report: &ApproachReport) -> Option<Figure> {
         Some(approach_figure(report, &case.units()))
+    }
+
+    fn remarks(_: &Case, report: &ApproachReport) -> Vec<Remark> {
+        report.remarks()
     }
 
     fn compute(

@@ -4,6 +4,7 @@ pub mod drive_signal;
 pub mod fixed_step;
 pub mod one_shot;
 
+use nanotap_case::physical::Remark;
 pub use nanotap_dynamics::ClassifyOptions;
 use nanotap_dynamics::{
     LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, Torus, classify,
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::figure::motion::{fixed_step_figure, one_shot_figure, simulation_figure};
 use crate::initial_state::initial_state_note;
+use crate::model_limits::limits_of;
 use drive_signal::StatedSignal;
 use fixed_step::{FixedStepRun, fixed_step_run};
 use nanotap_arithmetic::clock::Instant;
@@ -608,6 +610,29 @@ impl Study for SimulateStudy {
             SimulateReport::FixedStep(run) => fixed_step_figure(&model, run, &units),
             SimulateReport::OneShot(run) => one_shot_figure(&run.motion, &units),
         })
+    }
+
+    fn remarks(_: &Case, report: &SimulateReport) -> Vec<Remark> {
+        match report {
+            SimulateReport::Exact(run) => {
+                let (motion, physical) = (&run.motion, run.physical.as_ref());
+                let mut remarks = limits_of(&motion.observables, physical, &motion.out_of_range);
+                remarks.extend(Remark::notes(&motion.notes));
+                remarks
+            }
+            SimulateReport::OneShot(run) => {
+                let (motion, physical) = (&run.motion, run.physical.as_ref());
+                limits_of(&motion.observables, physical, &motion.out_of_range)
+            }
+            SimulateReport::FixedStep(run) => {
+                let mut remarks = Remark::notes(&run.notes);
+                remarks.push(Remark::note(
+                    "rk4 is the paper's method, kept to show the effect of a time step; its results are not \
+                     certified",
+                ));
+                remarks
+            }
+        }
     }
 
     fn compute(

@@ -46,13 +46,19 @@ class Answer:
         return text
 
     @cached_property
+    def messages(self) -> list[str]:
+        """What the terminal prints beside the report."""
+        texts: list[str] = self._of("messages")
+        return texts
+
+    @cached_property
     def figure(self) -> str | None:
         """The description of the figure."""
         text: str | None = self._of("figure")
         return text
 
     def __reduce__(self) -> tuple[Any, ...]:
-        names = ("tables", "csv", "figure")
+        names = ("tables", "csv", "figure", "messages")
         return _restored, ({name: getattr(self, name) for name in names},)
 
 
@@ -111,6 +117,17 @@ class Answered:
         # A file has no other place for it.
         attributes = {} if answer.figure is None else {"figure": answer.figure}
         return xr.Dataset(variables, attrs=attributes)
+
+    @property
+    def messages(self) -> list[str]:
+        """What the terminal prints beside this result: warnings where the model does not hold or something is
+        missing, and notes on what was assumed.
+
+        >>> import nanotap
+        >>> nanotap.orbit(nanotap.Case.paper(omega=20)).messages[-1].split(":")[0]
+        'note'
+        """
+        return list(self._known().messages)
 
     def plot(self, **options: Any) -> "Figure":
         """The figure of the study; options as in `nanotap.plot`."""

@@ -59,6 +59,12 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         return self
 
     @property
+    def messages(self) -> list[str]:
+        """What the terminal prints beside this result, as of other results; empty for what xarray makes of it."""
+        answer = answer_of(self)
+        return [] if answer is None else list(answer.messages)
+
+    @property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """All tables by name, first that of the terminal's CSV file; `attrs` of each has the `units`
         and `labels` of its columns."""

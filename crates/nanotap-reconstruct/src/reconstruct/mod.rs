@@ -19,6 +19,7 @@ mod rows;
 mod smooth;
 
 use nanotap_arithmetic::powf;
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 use nanotap_figures::Figure;
 use schemars::JsonSchema;
@@ -143,6 +144,10 @@ impl Study for ReconstructStudy {
 
     fn figure(_: &Case, report: &ReconstructReport) -> Option<Figure> {
         Some(reconstruct_figure(report))
+    }
+
+    fn remarks(_: &Case, report: &ReconstructReport) -> Vec<Remark> {
+        Remark::warnings(&report.remarks)
     }
 
     fn compute(

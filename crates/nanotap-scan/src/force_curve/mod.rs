@@ -27,6 +27,7 @@ mod run;
 mod statics;
 mod stretches;
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 
 pub use fits::{ContactFit, ContactModel};
@@ -131,6 +132,10 @@ impl Study for ForceCurveStudy {
 
     fn figure(_: &Case, report: &ForceCurveReport) -> Option<Figure> {
         Some(force_curve_figure(report))
+    }
+
+    fn remarks(_: &Case, report: &ForceCurveReport) -> Vec<Remark> {
+        Remark::warnings(&report.warnings)
     }
 
     fn compute(

@@ -8,6 +8,7 @@
 use std::collections::HashMap;
 use std::sync::{LazyLock, OnceLock};
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -94,6 +95,10 @@ impl DatasetStudy for ScanLines {
 
     fn any_distance(_: &ScanOptions) -> bool {
         true
+    }
+
+    fn remarks(report: &ScanReport) -> Vec<Remark> {
+        Remark::warnings(&report.warnings)
     }
 
     fn prepare(

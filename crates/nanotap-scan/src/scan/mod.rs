@@ -31,6 +31,7 @@ mod state_tracker;
 mod tapping_period;
 mod verdict;
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 
 pub use averaged::{AveragedLine, averaged_line};
@@ -89,6 +90,10 @@ impl Study for ScanStudy {
 
     fn figure(_: &Case, report: &ScanReport) -> Option<Figure> {
         Some(scan_figure(report))
+    }
+
+    fn remarks(_: &Case, report: &ScanReport) -> Vec<Remark> {
+        Remark::warnings(&report.warnings)
     }
 
     fn compute(

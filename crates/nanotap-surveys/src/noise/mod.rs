@@ -12,6 +12,7 @@ mod saddle;
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix2};
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_case::physical::Remark;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -224,6 +225,10 @@ impl Study for NoiseStudy {
 
     fn figure(_: &Case, report: &NoiseReport) -> Option<Figure> {
         Some(noise_figure(report))
+    }
+
+    fn remarks(_: &Case, report: &NoiseReport) -> Vec<Remark> {
+        Remark::notes(&report.notes)
     }
 
     fn compute(

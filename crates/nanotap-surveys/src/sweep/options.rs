@@ -1,5 +1,6 @@
 //! Options of a sweep.
 
+use nanotap_case::physical::Remark;
 use nanotap_dynamics::Control;
 
 use super::{Follow, Over, Starts, Summary, Sweep};
@@ -147,6 +148,10 @@ impl DatasetStudy for SweepStudy {
 
     fn any_distance(options: &SweepOptions) -> bool {
         options.over.solves_distance()
+    }
+
+    fn remarks(report: &Summary) -> Vec<Remark> {
+        Remark::notes(&report.notes)
     }
 
     fn prepare(

@@ -23,7 +23,7 @@ pub struct Capillary;
 parameters! {
     /// Surface tension of the liquid, N/m.
     pub const SURFACE_TENSION = own("surface_tension", "surface tension γ of the liquid",
-        Kind::SurfaceEnergy, Some(0.072), Range::Positive, "surface tension of the liquid (capillary)",
+        Kind::Stiffness, Some(0.072), Range::Positive, "surface tension of the liquid (capillary)",
         0.072).assumed();
     /// Thickness of the adsorbed film, m.
     pub const FILM_THICKNESS = own("film_thickness", "thickness h of the adsorbed film", Kind::Length, None,

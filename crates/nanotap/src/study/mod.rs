@@ -7,8 +7,8 @@ pub use nanotap_fit::{calibrate, fit};
 pub use nanotap_images::image_states;
 pub use nanotap_motions::simulate::{drive_signal, fixed_step, one_shot};
 pub use nanotap_motions::{
-    approach, attractors, branch, event, frequency_modulation, lyapunov, orbit, proof, setpoint,
-    simulate, upset,
+    approach, attractors, branch, event, frequency_modulation, lyapunov, model_limits, orbit,
+    proof, setpoint, simulate, upset,
 };
 pub use nanotap_reconstruct::reconstruct;
 pub use nanotap_scan::{force_curve, scan};

@@ -43,6 +43,7 @@ use serde_json::Value;
 
 pub use crate::study::STUDIES;
 use nanotap_case::Case;
+use nanotap_case::physical::Remark;
 use nanotap_dataset::Store;
 use nanotap_error::Error;
 use nanotap_fit::calibrate::CalibrateReport;
@@ -102,6 +103,10 @@ pub trait Answer: Send {
 
     /// The figure, if the study has one.
     fn figure(&self) -> Option<Figure>;
+
+    /// What front ends say beside the report: where the model does not hold, what is missing, and what was
+    /// assumed.
+    fn remarks(&self) -> Vec<Remark>;
 }
 
 /// The report of a study on a case, for front ends that ask more of it than an [`Answer`] says.
@@ -126,6 +131,10 @@ impl<S: Study> Answer for Answered<S> {
     fn figure(&self) -> Option<Figure> {
         S::figure(&self.case, &self.report)
     }
+
+    fn remarks(&self) -> Vec<Remark> {
+        S::remarks(&self.case, &self.report)
+    }
 }
 
 /// The summary of a dataset.
@@ -146,6 +155,10 @@ impl<S: DatasetStudy> Answer for Summarised<S> {
     fn figure(&self) -> Option<Figure> {
         Some(self.figure.clone())
     }
+
+    fn remarks(&self) -> Vec<Remark> {
+        S::remarks(&self.report)
+    }
 }
 
 impl Answer for CalibrateReport {
@@ -159,6 +172,10 @@ impl Answer for CalibrateReport {
 
     fn figure(&self) -> Option<Figure> {
         Some(self.figure())
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        self.remarks()
     }
 }
 

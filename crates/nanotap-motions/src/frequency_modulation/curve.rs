@@ -467,13 +467,13 @@ fn excess(point: &ApproachPoint, shift: f64) -> f64 {
     point.modulation.map_or(f64::NAN, |m| m.frequency_shift) - shift
 }
 
-/// Part of the largest force by which more rows may change the forces found from the shifts.
-const CHANGED: f64 = 0.01;
+/// Part of the largest force from which on the forces found from every second row differ notably.
+const DIFFERS: f64 = 0.03;
 
 /// Adds the force that follows from the shifts of each direction by the formula of Sader and
 /// Jarvis, and says so if more rows would give another one.
 fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) -> Option<String> {
-    let mut changed = 0.0_f64;
+    let mut apart = 0.0_f64;
     for way in [Way::Approach, Way::Retract] {
         let of_way = |p: &&mut ApproachPoint| p.way == way;
         let curve: Vec<(f64, f64)> = table
@@ -485,24 +485,24 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) -> Option<String>
             continue;
         }
         let forces = sader_jarvis(&curve, free.swing, free.stiffness);
-        changed = changed.max(by_more_rows(&curve, &forces, free));
+        apart = apart.max(from_every_second(&curve, &forces, free));
         for (point, force) in table.iter_mut().filter(of_way).zip(forces) {
             if let Some(modulation) = &mut point.modulation {
                 modulation.sader_jarvis_force = Some(force);
             }
         }
     }
-    (changed > CHANGED).then(|| {
+    (apart > DIFFERS).then(|| {
         format!(
-            "the force by the formula of Sader and Jarvis depends on the number of rows: more of them may change \
-             it by some {} % of the largest one",
-            significant(100.0 * changed, 1)
+            "the force by the formula of Sader and Jarvis depends on the number of rows: from every second row it \
+             differs by up to {} % of the largest force",
+            significant(100.0 * apart, 1)
         )
     })
 }
 
-/// By what part of the largest force more rows may change the forces, estimated from every second row.
-fn by_more_rows(curve: &[(f64, f64)], forces: &[f64], free: &FreeOscillation) -> f64 {
+/// By what part of the largest force the forces found from every second row differ.
+fn from_every_second(curve: &[(f64, f64)], forces: &[f64], free: &FreeOscillation) -> f64 {
     let half: Vec<(f64, f64)> = curve.iter().copied().step_by(2).collect();
     if half.len() < 3 {
         return f64::INFINITY;
@@ -513,12 +513,7 @@ fn by_more_rows(curve: &[(f64, f64)], forces: &[f64], free: &FreeOscillation) ->
     let largest = forces
         .iter()
         .fold(0.0_f64, |most, force| most.max(force.abs()));
-    // Half the distance between rows leaves a quarter of the error, so that a third of the change remains.
-    if largest > 0.0 {
-        apart / (3.0 * largest)
-    } else {
-        0.0
-    }
+    if largest > 0.0 { apart / largest } else { 0.0 }
 }
 
 /// Difference of relative shifts above which they differ; below it is rounding.

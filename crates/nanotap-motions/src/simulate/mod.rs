@@ -626,7 +626,7 @@ impl Study for SimulateStudy {
             }
             SimulateReport::FixedStep(run) => {
                 let mut remarks = Remark::notes(&run.notes);
-                remarks.push(Remark::note(
+                remarks.push(Remark::warning(
                     "rk4 is the paper's method, kept to show the effect of a time step; its results are not \
                      certified",
                 ));

@@ -530,6 +530,31 @@ fn the_force_is_recovered_from_the_shifts() {
     assert!(compared > 20, "{compared}");
 }
 
+/// Forces that other rows would change are warned of: by as much as they differ from those of every second row.
+#[test]
+fn forces_that_depend_on_the_rows_are_warned_of() {
+    let case = reference(1e6, 10.0, 11.0);
+    let [half, few, many] = [7, 13, 121].map(|points| modulated(&case, (20.0, 10.6), points));
+    let forces = |report: &ApproachReport, way: Way| -> Vec<f64> {
+        let rows = report.table.iter().filter(|p| p.way == way);
+        rows.map(|p| p.modulation.unwrap().sader_jarvis_force.unwrap())
+            .collect()
+    };
+    let size = |forces: &[f64]| forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+    let apart = [Way::Approach, Way::Retract].map(|way| {
+        let (half, few) = (forces(&half, way), forces(&few, way));
+        assert_eq!(few.len(), 2 * half.len() - 1);
+        let apart: Vec<f64> = (0..half.len()).map(|k| half[k] - few[2 * k]).collect();
+        size(&apart) / size(&few)
+    });
+    let percent = 100.0 * apart[0].max(apart[1]);
+    let said = few.limits.concat();
+    let stated = said.split("up to ").nth(1).unwrap();
+    let stated: f64 = stated.split(' ').next().unwrap().parse().unwrap();
+    assert!((stated / percent - 1.0).abs() < 0.5, "{said} {percent}");
+    assert!(many.limits.is_empty(), "{:?}", many.limits);
+}
+
 /// The free lever has no orbit with amplitude zero, and none with an impossible phase.
 #[test]
 fn impossible_amplitudes_and_phases_are_refused() {

@@ -101,8 +101,8 @@ impl Output {
         }
     }
 
-    /// Prints the remarks on a report: its notes as [`note`](Self::note), unless its JSON document holds them,
-    /// and its warnings.
+    /// Prints the remarks on a report: its warnings, and its notes as [`note`](Self::note), but in JSON, whose
+    /// document has the notes.
     pub(crate) fn remarks(&self, remarks: &[Remark]) {
         for remark in remarks {
             match remark.severity {

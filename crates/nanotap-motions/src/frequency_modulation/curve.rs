@@ -469,11 +469,13 @@ fn excess(point: &ApproachPoint, shift: f64) -> f64 {
 
 /// Part of the largest force from which on the forces found from every second row differ notably.
 const DIFFERS: f64 = 0.03;
+/// Least number of rows of which every second one makes a curve.
+const FEWEST: usize = 5;
 
 /// Adds the force that follows from the shifts of each direction by the formula of Sader and
 /// Jarvis, and says so if more rows would give another one.
 fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) -> Option<String> {
-    let mut apart = 0.0_f64;
+    let (mut apart, mut few) = (0.0_f64, false);
     for way in [Way::Approach, Way::Retract] {
         let of_way = |p: &&mut ApproachPoint| p.way == way;
         let curve: Vec<(f64, f64)> = table
@@ -485,6 +487,7 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) -> Option<String>
             continue;
         }
         let forces = sader_jarvis(&curve, free.swing, free.stiffness);
+        few |= curve.len() < FEWEST;
         apart = apart.max(from_every_second(&curve, &forces, free));
         for (point, force) in table.iter_mut().filter(of_way).zip(forces) {
             if let Some(modulation) = &mut point.modulation {
@@ -492,21 +495,24 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) -> Option<String>
             }
         }
     }
-    (apart > DIFFERS).then(|| {
+    let how = if few {
+        "with fewer than five rows each way it is not known by how much".to_owned()
+    } else if apart > DIFFERS {
         format!(
-            "the force by the formula of Sader and Jarvis depends on the number of rows: from every second row it \
-             differs by up to {} % of the largest force",
+            "from every second row it differs by up to {} % of the largest force",
             significant(100.0 * apart, 1)
         )
-    })
+    } else {
+        return None;
+    };
+    Some(format!(
+        "the force by the formula of Sader and Jarvis depends on the number of rows: {how}"
+    ))
 }
 
 /// By what part of the largest force the forces found from every second row differ.
 fn from_every_second(curve: &[(f64, f64)], forces: &[f64], free: &FreeOscillation) -> f64 {
     let half: Vec<(f64, f64)> = curve.iter().copied().step_by(2).collect();
-    if half.len() < 3 {
-        return f64::INFINITY;
-    }
     let coarser = sader_jarvis(&half, free.swing, free.stiffness);
     let pairs = coarser.iter().zip(forces.iter().step_by(2));
     let apart = pairs.fold(0.0_f64, |apart, (a, b)| apart.max((a - b).abs()));

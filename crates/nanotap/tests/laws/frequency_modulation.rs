@@ -553,6 +553,8 @@ fn forces_that_depend_on_the_rows_are_warned_of() {
     let stated: f64 = stated.split(' ').next().unwrap().parse().unwrap();
     assert!((stated / percent - 1.0).abs() < 0.5, "{said} {percent}");
     assert!(many.limits.is_empty(), "{:?}", many.limits);
+    let three = modulated(&case, (20.0, 10.6), 3).limits.concat();
+    assert!(three.contains("fewer than five rows"), "{three}");
 }
 
 /// The free lever has no orbit with amplitude zero, and none with an impossible phase.

@@ -249,6 +249,26 @@ def test_every_law_shows_the_terminals_states(
             page.complaints[:] = [w for w in page.complaints if "422" not in w]
 
 
+def test_a_state_for_which_the_model_does_not_hold_says_so(
+    page: Any, address: str, tmp_path: Path
+) -> None:
+    # The tip sinks into a soft sample by more than its radius, for which Hertz's law is not derived.
+    given = {"preset": "dmt", "set": ["drive.setpoint=0.7"]}
+    case = changed(address, "/api/law", given, law="hertz")
+    kept = [word for word in case["set"] if not word.startswith("sample.modulus")]
+    case = {**case, "set": [*kept, "sample.modulus=1 MPa"]}
+    states(page, address, fragment(case))
+    (tmp_path / "case.toml").write_text(case_file(address, case))
+    command = [PROGRAM, "orbit", str(tmp_path / "case.toml"), "--json"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    said = [line for line in done.stderr.splitlines() if "δ/R reaches" in line]
+    assert len(said) == 1
+    until(page, lambda: "δ/R reaches" in page.inner_text("#limits"))
+    assert said[0].removeprefix("warning: ") in page.inner_text("#limits")
+    states(page, address, "")
+    assert page.inner_text("#limits") == ""
+
+
 def test_each_law_is_in_one_family(page: Any, address: str) -> None:
     states(page, address, "")
     # The fields come with the motion, which may be answered after the rows.

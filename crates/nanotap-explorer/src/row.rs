@@ -4,7 +4,10 @@ use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Observable, Observables, time_series};
+use nanotap::observe::{
+    Observable, ObservableSet, Observables, OutOfRange, PhysicalMotion, measure, time_series,
+};
+use nanotap::study::model_limits::limits_of;
 use serde_json::{Map, Value, json};
 
 use crate::api_error::ApiError;
@@ -99,8 +102,24 @@ pub(crate) fn row(shown: &RowMotion<'_>) -> Result<Value, ApiError> {
         );
         row.insert("set".into(), set.into());
     }
+    let physical = case
+        .physical()
+        .map(|of| PhysicalMotion::alone(observables, None, of));
+    let limits = limits_of(observables, physical.as_ref(), &beyond(shown)).into_iter();
+    let limits: Vec<String> = limits.map(|remark| remark.text).collect();
+    row.insert("limits".into(), json!(limits));
     row.insert("film".into(), film(case, model, state, period)?);
     Ok(row.into())
+}
+
+/// The limits of the law that an orbit violates: how far it goes is not among the observables of every row.
+fn beyond(shown: &RowMotion<'_>) -> Vec<OutOfRange> {
+    let Some(period) = shown.period.filter(|_| shown.model.nonlinear.is_some()) else {
+        return Vec::new();
+    };
+    let set = OutOfRange::observed_with(shown.model, ObservableSet::NONE);
+    let seen = measure(shown.model, shown.state, period, set);
+    seen.map_or_else(|_| Vec::new(), |seen| OutOfRange::of(shown.model, &seen))
 }
 
 /// A length as a number and as text.

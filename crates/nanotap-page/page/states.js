@@ -504,6 +504,12 @@ function sure() {
   return words.join(" ");
 }
 
+/** Where the model does not hold for a stable state. */
+function limits() {
+  const said = rows.filter((row) => row.stable).flatMap((row) => (row.limits ?? []).map((text) => `${name(row)}: ${local(text)}.`));
+  return [...new Set(said)].join(" ");
+}
+
 /** The motions that the search found and that lie on no branch of the curve at its distance. */
 function offCurve() {
   if (!info.held || !fits() || !found) return [];
@@ -542,6 +548,7 @@ function draw(reason) {
   document.body.dataset.search = searching || following ? "busy" : "done";
   const words = verdict(reason);
   if ($("verdict").textContent !== words) $("verdict").textContent = words;
+  $("limits").textContent = limits();
   $("sure").textContent = sure();
   $("margin").textContent = marginWords();
   table(list);

@@ -39,8 +39,8 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     for own in UNPUBLISHED {
         command.args(["--exclude", own]);
     }
-    // Uncommitted changes are packed too. Cargo would compile each archive by itself, the dependencies of
-    // some with other features: four times the work of all together.
+    // Uncommitted changes are packed too. Cargo would compile each archive by itself, and the
+    // dependencies of some again with other features.
     command.args(["--allow-dirty", "--no-verify"]);
     if !succeeds(&workspace.root, &mut command)? {
         return Ok(Tally::check(false));

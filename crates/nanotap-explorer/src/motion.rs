@@ -3,7 +3,6 @@
 use std::sync::PoisonError;
 
 use nanotap::ErrorKind;
-use nanotap::case::physical::Remark;
 use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
@@ -11,8 +10,7 @@ use nanotap::figure::contact::contact_figure;
 use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure};
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Dimension, OBSERVABLES, Observable, Observables, PhysicalMotion};
-use nanotap::study::model_limits::limits_of;
+use nanotap::observe::{Dimension, OBSERVABLES, Observable, Observables};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use nanotap::study::registry::Study as _;
 use nanotap::study::request::read;
@@ -27,6 +25,7 @@ use crate::figures::drawn;
 use crate::film::film;
 use crate::motion_request::{MotionRequest, Start, model_of};
 use crate::readout::readout;
+use crate::row::limits;
 use crate::{Explorer, commands, forms, knobs};
 
 /// Largest number of drive periods in the film and the figures of a motion without a period.
@@ -67,15 +66,12 @@ impl Motion {
     }
 
     /// Where the model does not hold for it.
-    fn remarks(&self, case: &Case) -> Vec<Remark> {
+    fn limits(&self, case: &Case) -> Vec<String> {
         let beyond = match self {
             Self::Orbit(orbit) => &orbit.out_of_range,
             Self::Run(run) => &run.out_of_range,
         };
-        let physical = case
-            .physical()
-            .map(|of| PhysicalMotion::alone(self.observables(), None, of));
-        limits_of(self.observables(), physical.as_ref(), beyond)
+        limits(case, self.observables(), beyond)
     }
 
     pub(crate) fn observables(&self) -> &Observables {
@@ -164,8 +160,8 @@ pub(crate) fn answer(
     if let (Some(_), Some(state)) = (&request.from, &start.state) {
         said.start = Start::text(start.period, state);
     }
-    let remarks = motion.remarks(&case).into_iter().chain(case.remarks());
-    let remarks: Vec<String> = remarks.map(|remark| remark.text).collect();
+    let mut remarks = motion.limits(&case);
+    remarks.extend(case.remarks().into_iter().map(|remark| remark.text));
     Ok(json!({
         "title": case.title(),
         "summary": motion.words(),

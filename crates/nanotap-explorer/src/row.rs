@@ -102,14 +102,19 @@ pub(crate) fn row(shown: &RowMotion<'_>) -> Result<Value, ApiError> {
         );
         row.insert("set".into(), set.into());
     }
+    let limits = limits(case, observables, &beyond(shown));
+    row.insert("limits".into(), limits.into());
+    row.insert("film".into(), film(case, model, state, period)?);
+    Ok(row.into())
+}
+
+/// Where the model does not hold for a motion, in sentences.
+pub(crate) fn limits(case: &Case, observables: &Observables, beyond: &[OutOfRange]) -> Vec<String> {
     let physical = case
         .physical()
         .map(|of| PhysicalMotion::alone(observables, None, of));
-    let limits = limits_of(observables, physical.as_ref(), &beyond(shown)).into_iter();
-    let limits: Vec<String> = limits.map(|remark| remark.text).collect();
-    row.insert("limits".into(), json!(limits));
-    row.insert("film".into(), film(case, model, state, period)?);
-    Ok(row.into())
+    let limits = limits_of(observables, physical.as_ref(), beyond).into_iter();
+    limits.map(|remark| remark.text).collect()
 }
 
 /// The limits of the law that an orbit violates: how far it goes is not among the observables of every row.

@@ -26,6 +26,7 @@
 
 mod catalogue_levers;
 pub mod document;
+pub mod drive_signal;
 mod error;
 mod family;
 pub mod file;

@@ -101,15 +101,27 @@ impl Output {
         }
     }
 
-    /// Prints the remarks on a report: its warnings, and its notes as [`note`](Self::note), but in JSON, whose
-    /// document has the notes.
+    /// Prints a warning or a note.
+    pub(crate) fn remark(&self, remark: &Remark) {
+        match remark.severity {
+            Severity::Warning => self.warning(&remark.text),
+            Severity::Note => self.note(&remark.text),
+        }
+    }
+
+    /// Prints the remarks on a report; with `--json` its warnings only, since the document has the notes.
     pub(crate) fn remarks(&self, remarks: &[Remark]) {
-        for remark in remarks {
-            match remark.severity {
-                Severity::Warning => self.warning(&remark.text),
-                Severity::Note if self.json => {}
-                Severity::Note => self.note(&remark.text),
-            }
+        let is_told = |remark: &&Remark| !self.json || remark.severity == Severity::Warning;
+        remarks
+            .iter()
+            .filter(is_told)
+            .for_each(|remark| self.remark(remark));
+    }
+
+    /// Warns that a report holds what was finished before it was stopped.
+    pub(crate) fn stopped(&self, cancelled: bool) {
+        if cancelled {
+            self.warning("stopped before it was done");
         }
     }
 

@@ -14,7 +14,6 @@ use serde::Serialize;
 
 use crate::approach::states_near;
 use crate::figure::attractors::attractors_figure;
-use crate::model_limits::limits_of;
 use crate::orbit::{OrbitReport, report, spectral_radius};
 use crate::proof::Prover;
 use crate::simulate::{Classification, largest_exponent, orbit_evidence, torus_evidence};
@@ -25,6 +24,7 @@ use nanotap_error::Error;
 use nanotap_model::Model;
 use nanotap_model::model_map::ModelMap;
 use nanotap_observe::frame::{Form, Frame, Rows, frame};
+use nanotap_observe::model_limits::limits_of;
 use nanotap_observe::time_series::entry_names;
 use nanotap_observe::time_series::state_names;
 use nanotap_observe::{Dimension, ObservableSet, Observables, PhysicalMotion, measure};

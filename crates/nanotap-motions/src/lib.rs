@@ -22,7 +22,6 @@ pub mod frequency_modulation;
 pub mod initial_state;
 pub mod lyapunov;
 pub mod map;
-pub mod model_limits;
 pub mod orbit;
 pub mod proof;
 pub mod setpoint;

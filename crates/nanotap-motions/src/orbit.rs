@@ -18,7 +18,6 @@ use serde::Serialize;
 use crate::approach::SETPOINT_PERIODS;
 use crate::figure::motion::orbit_figure;
 use crate::initial_state::initial_state_note;
-use crate::model_limits::limits_of;
 use crate::proof::{ProofReport, Prover};
 use crate::simulate::{NamedMotion, starting_state};
 use crate::upset::{Knocks, upset};
@@ -31,6 +30,7 @@ use nanotap_model::recording::{NonlinearRecording, Recording};
 use nanotap_model::{MemoryReset, Model};
 use nanotap_observe::PhysicalMotion;
 use nanotap_observe::frame::{FileUnit, Frame, Rows, frame};
+use nanotap_observe::model_limits::limits_of;
 use nanotap_observe::{
     ContactEvent, Derivative, Dimension, ObservableSet, Observables, OutOfRange, RecordOptions,
     Recorder, Spectrum,

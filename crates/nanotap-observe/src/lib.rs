@@ -22,6 +22,7 @@ pub mod glossary;
 mod harmonics;
 mod measure;
 mod measured;
+pub mod model_limits;
 mod nonlinear;
 mod number;
 mod physical_motion;

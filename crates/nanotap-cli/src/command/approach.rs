@@ -58,9 +58,7 @@ pub(super) fn print<S: Study<Report = ApproachReport>>(
     points: PointsArgument,
     output: &Output,
 ) -> Result<(), Failure> {
-    if report.cancelled {
-        output.warning("stopped before it was done");
-    }
+    output.stopped(report.cancelled);
     output.remarks(&S::remarks(case, &report));
     study.write(case, &report)?;
     if let Some(branches) = &mut report.branches {

@@ -53,9 +53,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         options.observables = options.observables.with(shown);
     }
     let mut report = progress::study::<BranchStudy>(&case, &options, &arguments.threads)?;
-    if report.cancelled {
-        output.warning("stopped before it was done");
-    }
+    output.stopped(report.cancelled);
     let model = case.model()?;
     if let Some(path) = &arguments.study.out.out {
         let names = time_series::state_names(&model);

@@ -8,7 +8,7 @@ use nanotap::case::document::equilibria;
 use nanotap::case::file as case_file;
 use nanotap::case::physical::Held;
 use nanotap::case::physical::force::SampleForce;
-use nanotap::case::physical::{Kind, Physical, Severity};
+use nanotap::case::physical::{Kind, Physical};
 use nanotap::case::{Case, Key};
 use nanotap::frame::Frame;
 use nanotap::model::beam::Modes;
@@ -81,8 +81,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     case.model()?;
     let document = SolvedCase::of(&case, setpoint_solved);
     if let Some(numbers) = case.cantilever() {
-        remarks(&case, output);
-        remark(numbers, output);
+        case.remarks()
+            .iter()
+            .for_each(|remark| output.remark(remark));
+        note_oddities(numbers, output);
     }
     for beyond in &document.out_of_range {
         output.warning(&format!("where the lever rests, {beyond}"));
@@ -113,21 +115,13 @@ fn unsolved(
     output: &Output,
 ) -> Result<(), Failure> {
     write_out(arguments, case)?;
-    remarks(case, output);
+    case.remarks()
+        .iter()
+        .for_each(|remark| output.remark(remark));
     output.result(&CaseReport::Unsolved(Box::new(document)), |_| {
         let view = case.physical();
         view.map_or_else(String::new, |view| physical(case.title(), view, None))
     })
-}
-
-/// Prints the notes and warnings about a case.
-fn remarks(case: &Case, output: &Output) {
-    for remark in case.remarks() {
-        match remark.severity {
-            Severity::Note => output.note(&remark.text),
-            Severity::Warning => output.warning(&remark.text),
-        }
-    }
 }
 
 /// Writes the case where `--out` says: a physical one in its quantities, or with `--model-units` as
@@ -161,7 +155,8 @@ fn write_out(arguments: &Arguments, case: &Case) -> Result<(), Failure> {
     file::write_case(path, &case_file::to_toml(numbers))
 }
 
-fn remark(case: &Cantilever, output: &Output) {
+/// Notes what is unusual about the numbers of a beam.
+fn note_oddities(case: &Cantilever, output: &Output) {
     if case.cosine_term == CosineTerm::Printed {
         output.note("the cosine term of Eq. (14) is taken as printed, without its Ω");
     }

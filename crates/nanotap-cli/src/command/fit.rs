@@ -112,9 +112,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.plot.plot {
         file::draw(path, &fit_figure(&report))?;
     }
-    if report.cancelled {
-        output.warning("stopped before it was done");
-    }
+    output.stopped(report.cancelled);
     output.remarks(&FitStudy::remarks(&case, &report));
     let written = Written {
         path: arguments.out.as_ref(),

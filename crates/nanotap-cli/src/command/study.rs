@@ -76,9 +76,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })?;
     let document: Value = serde_json::from_str(&answer.document()?)
         .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
-    if document["cancelled"] == true {
-        output.warning("stopped before it was done");
-    }
+    output.stopped(document["cancelled"] == true);
     output.remarks(&answer.remarks());
     output.result(&document, text)
 }

@@ -1,6 +1,5 @@
 //! Simulation of a motion: the transient is discarded, the rest recorded, measured and classified.
 
-pub mod drive_signal;
 pub mod fixed_step;
 pub mod one_shot;
 
@@ -14,11 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::figure::motion::{fixed_step_figure, one_shot_figure, simulation_figure};
 use crate::initial_state::initial_state_note;
-use crate::model_limits::limits_of;
-use drive_signal::StatedSignal;
 use fixed_step::{FixedStepRun, fixed_step_run};
 use nanotap_arithmetic::clock::Instant;
 use nanotap_case::Case;
+use nanotap_case::drive_signal::StatedSignal;
 use nanotap_case::state::WrittenState;
 use nanotap_case::units::Units;
 use nanotap_dynamics::control::Control;
@@ -29,6 +27,7 @@ use nanotap_model::recording::Recording;
 use nanotap_model::{Model, MotionError};
 use nanotap_observe::PhysicalMotion;
 use nanotap_observe::frame::Frame;
+use nanotap_observe::model_limits::limits_of;
 use nanotap_observe::time_series;
 use nanotap_observe::{
     ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, contact_table, record,

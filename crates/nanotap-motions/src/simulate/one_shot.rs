@@ -9,10 +9,10 @@ use serde::Serialize;
 
 use std::sync::Arc;
 
-use super::drive_signal::ReadSignal;
 use super::{Classification, SimulateOptions, is_none, starting_state};
 use crate::figure::motion::contact_intervals;
 use nanotap_case::Case;
+use nanotap_case::drive_signal::ReadSignal;
 use nanotap_dynamics::Control;
 use nanotap_error::Error;
 use nanotap_flow::Output;

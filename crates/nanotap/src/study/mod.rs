@@ -3,13 +3,15 @@
 
 pub mod registry;
 
+pub use nanotap_case::drive_signal;
 pub use nanotap_fit::{calibrate, fit};
 pub use nanotap_images::image_states;
-pub use nanotap_motions::simulate::{drive_signal, fixed_step, one_shot};
+pub use nanotap_motions::simulate::{fixed_step, one_shot};
 pub use nanotap_motions::{
-    approach, attractors, branch, event, frequency_modulation, lyapunov, model_limits, orbit,
-    proof, setpoint, simulate, upset,
+    approach, attractors, branch, event, frequency_modulation, lyapunov, orbit, proof, setpoint,
+    simulate, upset,
 };
+pub use nanotap_observe::model_limits;
 pub use nanotap_reconstruct::reconstruct;
 pub use nanotap_scan::{force_curve, scan};
 pub use nanotap_study::{

@@ -1,8 +1,9 @@
 //! Where the model does not hold for a motion, in sentences.
 
 use nanotap_case::physical::{Kind, Remark};
-use nanotap_observe::{Observables, OutOfRange, PhysicalMotion};
 use nanotap_quantity::number::significant;
+
+use crate::{Observables, OutOfRange, PhysicalMotion};
 
 /// Warnings of a motion for which the model does not hold: the law is not valid as far as it goes, Hertz's
 /// stiffness is that of another depth, or another part of the beam than the tip would touch.

@@ -13,9 +13,9 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 use serde_json::{Value, json};
 
-use nanotap_case::Case;
-use nanotap_case::quantity::Kind;
-use nanotap_case::table::{Entry, Header, Table};
+use crate::Case;
+use crate::quantity::Kind;
+use crate::table::{Entry, Header, Table};
 use nanotap_error::Error;
 use nanotap_model::drive_signal::{DriveSignal, MAX_PIECES, MAX_TURNS, Pieces};
 

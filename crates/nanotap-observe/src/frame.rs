@@ -300,6 +300,30 @@ pub struct Column<'a> {
     of: Box<dyn Fn(usize) -> Cell + 'a>,
 }
 
+impl<'a> Column<'a> {
+    /// A column whose head is its label, too. (Not generic: a frame has dozens.)
+    fn new(
+        name: Cow<'static, str>,
+        head: Cow<'static, str>,
+        (dimension, form): (Dimension, Form),
+        of: Box<dyn Fn(usize) -> Cell + 'a>,
+    ) -> Self {
+        Self {
+            si_name: name.clone(),
+            name,
+            label: head.clone(),
+            head,
+            dimension,
+            form,
+            in_si: false,
+            only_in_files: false,
+            align: None,
+            in_files: None,
+            of,
+        }
+    }
+}
+
 /// A table of a report: named columns of one length.
 pub struct Frame<'a> {
     /// Name of the table.
@@ -512,21 +536,10 @@ impl<'a, R: Clone + 'a> Rows<'a, R> {
         shown: impl Into<(Dimension, Form)>,
         of: impl Fn(R) -> C + 'a,
     ) -> Self {
-        let (name, head, rows) = (name.into(), head.into(), Rc::clone(&self.rows));
-        let (dimension, form) = shown.into();
-        self.frame.columns.push(Column {
-            si_name: name.clone(),
-            name,
-            label: head.clone(),
-            head,
-            dimension,
-            form,
-            in_si: false,
-            only_in_files: false,
-            align: None,
-            in_files: None,
-            of: Box::new(move |row| of(rows[row].clone()).cell()),
-        });
+        let rows = Rc::clone(&self.rows);
+        let of = Box::new(move |row: usize| of(rows[row].clone()).cell());
+        let column = Column::new(name.into(), head.into(), shown.into(), of);
+        self.frame.columns.push(column);
         self
     }
 

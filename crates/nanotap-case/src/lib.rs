@@ -780,20 +780,26 @@ impl Case {
     /// A key with its value, as in `gap.tip = 20.32 nm`: of a physical case in SI, a number of the
     /// equations as the quantity of the case file that it represents.
     pub fn named(&self, key: Key, value: f64) -> String {
-        let unit = self.parameter_unit(key);
-        let quantity = key.parameter().zip(unit).and_then(|(parameter, _)| {
-            let represents = |of: &Key| {
-                let feeds = of.entry().feeds.or_else(|| of.law_number());
-                of.is_physical()
-                    && of.cannot_vary().is_none()
-                    && feeds == Some(parameter)
-                    && Some(of.kind()) == unit.map(|unit| unit.kind)
-                    && self.get(*of).is_finite()
-            };
-            Key::all().find(represents)
-        });
         let shown = self.shown(key, value);
-        format!("{} = {shown}", quantity.unwrap_or(key).path())
+        format!("{} = {shown}", self.quantity_of(key).path())
+    }
+
+    /// The quantity of the case file that a number of the equations represents in a physical case, one
+    /// that has a value if there are several; any other key is its own.
+    fn quantity_of(&self, key: Key) -> Key {
+        let (Some(parameter), Some(unit)) = (key.parameter(), self.parameter_unit(key)) else {
+            return key;
+        };
+        let represents = |of: &Key| {
+            let feeds = of.entry().feeds.or_else(|| of.law_number());
+            of.is_physical()
+                && of.cannot_vary().is_none()
+                && feeds == Some(parameter)
+                && of.kind() == unit.kind
+        };
+        let all = || Key::all().filter(represents);
+        let with_value = all().find(|of| self.get(*of).is_finite());
+        with_value.or_else(|| all().next()).unwrap_or(key)
     }
 
     /// Parses a value of a key that an option implies, as `from` of an approach curve: of a
@@ -818,7 +824,7 @@ impl Case {
         let value = kind
             .parse(text)
             .map_err(|error| ValueOfKeyError::Quantity {
-                key,
+                key: self.quantity_of(key),
                 text: text.to_owned(),
                 error: Box::new(error),
             })?;

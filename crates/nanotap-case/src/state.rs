@@ -21,6 +21,7 @@ use super::quantity::Kind;
 use super::units::Units;
 use nanotap_error::Error;
 use nanotap_model::Model;
+use nanotap_quantity::number::shortest;
 
 /// Name of the entries in the model's units.
 const MODEL_UNITS: &str = "model_units";
@@ -67,10 +68,17 @@ impl WrittenEntry {
         }
     }
 
-    /// The entry called `name` in the model's units.
-    fn read(&self, name: &str, units: &Units) -> Result<f64, Error> {
+    /// The entry called `name` in the model's units; `written` is the name by which it is stated.
+    fn read(&self, name: &str, written: &str, units: &Units) -> Result<f64, Error> {
         units.read_entry(name, &self.to_string()).map_err(|error| {
-            Error::input(format!("`{self}` as {name} of the state: {error}"), SHAPE)
+            let stated = match self {
+                Self::Number(number) => shortest(*number),
+                Self::Text(text) => text.clone(),
+            };
+            Error::input(
+                format!("`{stated}` as {written} of the state: {error}"),
+                SHAPE,
+            )
         })
     }
 }
@@ -175,7 +183,7 @@ impl WrittenState {
                 };
                 let entries = row.iter().enumerate();
                 entries
-                    .map(|(k, value)| value.read(&name(k), units))
+                    .map(|(k, value)| value.read(&name(k), &name(k), units))
                     .collect()
             }
             Self::Named(named) => {
@@ -201,7 +209,7 @@ impl WrittenState {
                         ));
                     }
                     known.push(entry);
-                    state[place] = value.read(entry, units)? / shape;
+                    state[place] = value.read(entry, name, units)? / shape;
                 }
                 Ok(state)
             }

@@ -64,10 +64,15 @@ impl Over {
     /// # Errors
     /// When it has another form, or parameter or values are not valid for the case.
     pub fn parse(given: &str, case: &Case) -> Result<Self, Error> {
-        let wrong = |what: &dyn fmt::Display| wrong(given, what);
+        let wrong = |what: &dyn fmt::Display| wrong(given, case, what);
         let form = |what: &str| {
             wrong(&format_args!(
-                "{what}; write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
+                "{what}; {}",
+                if case.is_physical() {
+                    "write it as in gap.tip=10nm:20nm:400, drive.frequency=300kHz:330kHz:50:log, or gap.tip=10nm,12nm"
+                } else {
+                    "write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
+                }
             ))
         };
         let (name, range) = given.split_once('=').ok_or_else(|| form("missing `=`"))?;
@@ -146,6 +151,7 @@ impl Over {
         let Self {
             from, to, count, ..
         } = *self;
+        let shown = |value: f64| self.kind.format_exact(value);
         if !(1..=MOST).contains(&count) {
             return Err(format!("{count} values; from 1 to {MOST} can be had"));
         }
@@ -154,19 +160,23 @@ impl Over {
         }
         if count > 1 && from >= to {
             return Err(format!(
-                "from {from} to {to}; the last value must be greater than the first \
-                 ({{follow}} down goes down)"
+                "from {} to {}; the last value must be greater than the first ({{follow}} down goes down)",
+                shown(from),
+                shown(to)
             ));
         }
         let mut pairs = self.listed.windows(2);
         if let Some([before, after]) = pairs.find(|pair| pair[0] >= pair[1]) {
             return Err(format!(
-                "{before} before {after}; every value must be greater than the one before"
+                "{} before {}; every value must be greater than the one before",
+                shown(*before),
+                shown(*after)
             ));
         }
         if self.spacing == Spacing::Log && from <= 0.0 {
             return Err(format!(
-                "from {from} in equal ratios; both ends must be above 0"
+                "from {} in equal ratios; both ends must be above 0",
+                shown(from)
             ));
         }
         if self.key == Key::DriveSetpoint {
@@ -174,9 +184,10 @@ impl Over {
             let is_shift = self.kind == Kind::Frequency;
             if !is_shift && from <= 0.0 || is_fraction && to >= 1.0 {
                 return Err(format!(
-                    "from {from} to {to}; expected setpoints that are fractions of the free \
-                     amplitude above 0 and below 1, amplitudes, peak forces or phases, all above 0, \
-                     or frequency shifts"
+                    "from {} to {}; expected setpoints that are fractions of the free amplitude above 0 and \
+                     below 1, amplitudes, peak forces or phases, all above 0, or frequency shifts",
+                    shown(from),
+                    shown(to)
                 ));
             }
         }
@@ -271,15 +282,22 @@ fn key(given: &str, name: &str, case: &Case) -> Result<Key, Error> {
     if case.is_physical() && name == Key::DriveSetpoint.path() {
         return Ok(Key::DriveSetpoint);
     }
-    case.key(name).map_err(|error| wrong(given, &error))
+    case.key(name).map_err(|error| wrong(given, case, &error))
 }
 
 /// The error of an axis that is not valid.
-fn wrong(given: &str, what: &dyn fmt::Display) -> Error {
+fn wrong(given: &str, case: &Case, what: &dyn fmt::Display) -> Error {
+    let [range, values] = if case.is_physical() {
+        ["gap.tip=10nm:20nm:400", "gap.tip=10nm,12nm,15nm"]
+    } else {
+        ["omega=2:4:400", "omega=2,2.5,4"]
+    };
     Error::option(
         "over",
         format!("`{given}`: {what}"),
-        "write omega=2:4:400: parameter, first value, last value, how many; or the values, omega=2,2.5,4",
+        format!(
+            "write {range}: parameter, first value, last value, how many; or the values, {values}"
+        ),
     )
 }
 

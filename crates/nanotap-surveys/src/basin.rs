@@ -117,6 +117,7 @@ impl SliceRange {
             )));
         }
         if from >= to {
+            let [from, to] = [from, to].map(|value| units.shown_entry(name, value, 6));
             return Err(refuse(format!(
                 "from {from} to {to}; the last value must be greater"
             )));

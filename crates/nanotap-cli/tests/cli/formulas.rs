@@ -26,7 +26,12 @@ fn mistakes_are_refused_with_their_place() {
         (
             "k*max(-d, 0)",
             "",
-            "at character 1 (\"k\"): it has no value",
+            "at character 1 (\"k\"): it has no value: state it under [sample.parameters], as in k = \"2.8 N/m\"",
+        ),
+        (
+            "k*max(-d, 0) - c*v",
+            "",
+            "state it under [sample.parameters] with its unit",
         ),
         ("k*d^2", "k = \"5 N/m\"", "where a force is needed"),
         (

@@ -55,6 +55,38 @@ fn physical_and_dimensionless_values_are_shown() {
     }
 }
 
+/// What is wrong with an option is said in the quantities of the case.
+#[test]
+fn refusals_are_in_the_units_of_the_case() {
+    let folder = Folder::new();
+    folder.write("lever.toml", LEVER);
+    for (arguments, words) in [
+        (
+            "sweep lever.toml --over gap.tip=10nm:10nm:3",
+            "from 10 nm to 10 nm; the last value must be greater",
+        ),
+        (
+            "sweep lever.toml --over gap.tip=10nm,10nm",
+            "write gap.tip=10nm:20nm:400",
+        ),
+        (
+            "basin lever.toml --x a1=5nm:1nm:9 --y v1=-1:1:9",
+            "from 5 nm to 1 nm; the last value must be greater",
+        ),
+        (
+            "orbit lever.toml --state=tip=5",
+            "`5` as tip of the state: expected a length below",
+        ),
+        (
+            "approach lever.toml --from 30N",
+            "30N: gap.tip: expected a length such as",
+        ),
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        folder.run(&arguments).refused(&[words]);
+    }
+}
+
 #[test]
 fn a_physical_case_written_out_is_its_dimensionless_self() {
     let folder = Folder::new();

@@ -117,9 +117,9 @@ pub fn law(
             }
             (None, Some((_, entry))) => *entry,
             (None, None) => {
-                let reason = format!(
-                    "it has no value: state it under [sample.parameters], as in {name} = \"1 nN\""
-                );
+                let example = example(&formula, name, parameters);
+                let reason =
+                    format!("it has no value: state it under [sample.parameters]{example}");
                 return Err(formula.without_value(name, reason));
             }
         };
@@ -155,6 +155,29 @@ pub fn law(
     }));
     laws.insert(key, law);
     Ok(law)
+}
+
+/// How the value of a parameter is stated: with the unit that makes the formula a force, if this parameter is
+/// the only one without a value.
+fn example(formula: &Formula, name: &str, given: &[(&str, Dimension)]) -> String {
+    let dimension = |other: &String, own: Kind| {
+        let given = given.iter().find(|(of, _)| of == other);
+        let known = KNOWN.iter().find(|(of, _)| of == other);
+        match (given, known) {
+            (Some((_, dimension)), _) => Some(*dimension),
+            (None, Some((_, entry))) => Some(entry.kind.dimension()),
+            (None, None) => (other == name).then(|| own.dimension()),
+        }
+    };
+    let fits = |kind: &&Kind| {
+        let all = formula.parameters().iter();
+        let dimensions: Option<Vec<_>> = all.map(|other| dimension(other, **kind)).collect();
+        dimensions.is_some_and(|all| formula.check(&all, Kind::Force.dimension()).is_ok())
+    };
+    match Kind::ALL.iter().find(fits) {
+        Some(kind) => format!(", as in {name} = \"{}\"", kind.example()),
+        None => " with its unit".to_owned(),
+    }
 }
 
 /// The parameter of a formula that a case states under `[sample.parameters]`.

@@ -216,13 +216,14 @@ def changed(
     return {**case, "set": [f"{key}={value}" for key, value in kept.items()]}
 
 
-# The laws in parts, so that none takes longer than a test may.
+# Every third law, since the page takes the states of all from one study; in parts, so that none takes longer than
+# a test may.
 @pytest.mark.usefixtures("rows_alone")
-@pytest.mark.parametrize("part", range(8))
-def test_every_law_shows_the_terminals_states(
+@pytest.mark.parametrize("part", range(4))
+def test_a_law_shows_the_terminals_states(
     page: Any, address: str, tmp_path: Path, part: int
 ) -> None:
-    for number, law in list(enumerate(laws(address)))[part::8]:
+    for number, law in list(enumerate(laws(address)[::3]))[part::4]:
         lever, amplitude, setpoint = LEVERS[number % 3]
         wide, high = SIZES[number % 3]
         case = {

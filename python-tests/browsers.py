@@ -145,6 +145,21 @@ def without_knocks(page: Any) -> Any:
     return page
 
 
+@contextlib.contextmanager
+def held(page: Any, path: str) -> Iterator[None]:
+    """Answers to requests of a path come only after this."""
+    waiting: list[Any] = []
+    page.route(f"**{path}", lambda route: waiting.append(route))
+    try:
+        yield
+    finally:
+        for route in waiting:
+            # A request that a newer one replaced has ended.
+            with contextlib.suppress(Exception):
+                route.continue_()
+        page.unroute(f"**{path}")
+
+
 def case_file(address: str, case: dict[str, Any]) -> str:
     return asked(address, "/api/export", {"case": case, "format": "toml"}).decode()
 

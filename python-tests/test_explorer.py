@@ -31,6 +31,7 @@ from browsers import (
     address_of,
     asked,
     case_file,
+    held,
     idle,
     limited,
     observed,
@@ -1177,10 +1178,11 @@ def test_a_study_is_stopped_only_while_it_runs(page: Any, address: str) -> None:
 
 
 def test_a_late_census_of_another_case_is_dropped(page: Any, address: str) -> None:
-    opened(page, address, "preset=paper-chaos")
-    page.wait_for_selector("#bound:has-text('searching')")
-    typed(page, "omega", "3")
-    until(page, lambda: "set.omega=3" in page.url)
+    with held(page, "/api/attractors"):
+        opened(page, address, "preset=paper-chaos")
+        page.wait_for_selector("#bound:has-text('searching')")
+        typed(page, "omega", "3")
+        until(page, lambda: "set.omega=3" in page.url)
     # Its search has ended, and another one finds what there is.
     page.wait_for_selector("#attractors button")
     assert page.locator("#attractors button").count() == 1

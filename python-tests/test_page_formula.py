@@ -7,7 +7,7 @@ import urllib.parse
 from typing import Any
 
 import pytest
-from browsers import asked, case_file
+from browsers import asked, case_file, idle
 from test_page_states import shown, states, until
 
 # DMT of the table, with the reduced modulus of sample and tip written out.
@@ -44,8 +44,10 @@ def opened(page: Any, address: str) -> None:
 
 
 def settled(page: Any) -> None:
+    """Waits for the rows, and for the motion that brings the fields of the case."""
     page.wait_for_timeout(50)
     page.wait_for_selector("body[data-rows=done]")
+    idle(page)
 
 
 def typed(page: Any, text: str) -> None:
@@ -197,7 +199,7 @@ def test_another_law_and_back_keeps_what_was_typed(page: Any, address: str) -> N
     page.select_option("#choose-law", "jkr")
     until(page, lambda: set_in(page)["sample.law"] == "jkr")
     settled(page)
-    assert page.is_hidden("#formula")
+    page.wait_for_selector("#formula", state="hidden")
     assert set_in(page)["sample.force"] == ""
     page.select_option("#choose-law", "formula")
     until(page, lambda: set_in(page)["sample.law"] == "formula")

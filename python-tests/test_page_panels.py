@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import time
 from collections.abc import Iterator
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsers import limited
+from browsers import held, limited
 from test_page_states import NUMBERS, solved, until
 
 CURVE = Path(__file__).parent.parent / "docs/cases/polystyrene-curve.csv"
@@ -28,21 +27,6 @@ def _limit() -> Iterator[None]:
 def opened(page: Any, address: str, fragment: str) -> None:
     page.goto("about:blank")
     page.goto(f"{address}#{fragment}")
-
-
-@contextlib.contextmanager
-def held(page: Any, path: str) -> Iterator[None]:
-    """Answers to requests of a path come only after this."""
-    waiting: list[Any] = []
-    page.route(f"**{path}", lambda route: waiting.append(route))
-    try:
-        yield
-    finally:
-        for route in waiting:
-            # A request that a newer one replaced has ended.
-            with contextlib.suppress(Exception):
-                route.continue_()
-        page.unroute(f"**{path}")
 
 
 def words(page: Any, place: str) -> str:

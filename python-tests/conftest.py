@@ -119,7 +119,12 @@ def browser(playwright: Any) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def page(address: str, browser: Any) -> Any:
-    page = without_knocks(browser.new_page(viewport={"width": 1440, "height": 1000}))
+    # The films stand still: drawing them takes half of a processor.
+    page = without_knocks(
+        browser.new_page(
+            viewport={"width": 1440, "height": 1000}, reduced_motion="reduce"
+        )
+    )
     page.set_default_timeout(1000 * WAIT)
     page.complaints = []
     page.asked = []
@@ -133,3 +138,11 @@ def page(address: str, browser: Any) -> Any:
         page.goto(f"{address}#view=studies")
         page.wait_for_selector("td[data-observable=amplitude]")
     return page
+
+
+@pytest.fixture
+def films(page: Any) -> Iterator[None]:
+    """A page whose films move."""
+    page.emulate_media(reduced_motion="no-preference")
+    yield
+    page.emulate_media(reduced_motion="reduce")

@@ -598,6 +598,7 @@ def draws(page: Any, name: str) -> None:
     until(page, lambda: inked(page, name) > 0.01)
 
 
+@pytest.mark.usefixtures("films")
 def test_every_panel_shows_something(page: Any, address: str) -> None:
     opened(page, address, "preset=paper")
     # Deflection, portrait, harmonics, multipliers; height, force, force against height.
@@ -608,6 +609,7 @@ def test_every_panel_shows_something(page: Any, address: str) -> None:
     assert label.startswith("height over the sample")
     assert page.locator("#knobs input[data-key]").count() >= 8
     drawn = "import('/lever.js').then((m) => m.frames.drawn)"
+    page.locator("#lever").scroll_into_view_if_needed()
     before = page.evaluate(drawn)
     until(page, lambda: page.evaluate(drawn) > before)
 
@@ -1486,6 +1488,7 @@ def test_the_tour_of_a_jump(page: Any, address: str) -> None:
     assert abs(forces[0] - forces[1]) > 0.05 * max(forces)
 
 
+@pytest.mark.usefixtures("films")
 def test_a_surface_is_drawn_and_the_tip_follows_it(page: Any, address: str) -> None:
     opened(page, address, "preset=stiff-lever&tab=image&study.surface=drawn")
     pad = page.locator("#study-form .hand canvas").bounding_box()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_page_states import settled, states
+from test_page_states import settled, states, until
 
 RULES = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"]
 VIEWS = [
@@ -64,16 +64,31 @@ def test_at_four_times_the_size_nothing_scrolls_sideways(
 
 
 def test_with_reduced_motion_the_films_stand_still(page: Any, address: str) -> None:
-    page.emulate_media(reduced_motion="reduce")
+    states(page, address, "")
+    assert page.inner_text("#hold") == "Play"
+    picture = "document.querySelector('#rows canvas').toDataURL()"
+    before = page.evaluate(picture)
+    page.wait_for_timeout(500)
+    assert page.evaluate(picture) == before
+
+
+@pytest.mark.usefixtures("films")
+def test_a_film_moves_while_it_is_on_the_screen(page: Any, address: str) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
     try:
         states(page, address, "")
-        assert page.inner_text("#hold") == "Play"
+        assert page.inner_text("#hold") == "Pause"
         picture = "document.querySelector('#rows canvas').toDataURL()"
+        page.locator("#rows canvas").first.scroll_into_view_if_needed()
+        before = page.evaluate(picture)
+        until(page, lambda: page.evaluate(picture) != before)
+        page.evaluate("scrollTo(0, document.body.scrollHeight)")
+        page.wait_for_timeout(200)
         before = page.evaluate(picture)
         page.wait_for_timeout(500)
         assert page.evaluate(picture) == before
     finally:
-        page.emulate_media(reduced_motion="no-preference")
+        page.set_viewport_size({"width": 1440, "height": 1000})
 
 
 def test_keys_alone_choose_a_state_and_change_the_setpoint(

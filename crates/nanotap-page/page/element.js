@@ -7,6 +7,12 @@ export function make(name, properties = {}, ...children) {
   return made;
 }
 
+/** Whether an element is on the screen: a film moves only there. */
+export function inView(one) {
+  const { width, top, bottom } = one.getBoundingClientRect();
+  return width > 0 && bottom > 0 && top < innerHeight;
+}
+
 /** An element of a picture, with attributes and children. */
 export function drawn(name, attributes, ...children) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);

@@ -1,6 +1,8 @@
 // The tip of a state over the sample in slow motion: its whole swing, and the lowest part magnified. All rows
 // have one scale and one clock, so that states are compared by eye.
 
+import { inView } from "./element.js";
+
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const SPEED = 0.45;           // drive periods per second
 const NEAR = 0.1;             // height of the magnified part over the free amplitude
@@ -9,7 +11,7 @@ let time = 0.18;              // in drive periods
 let before = 0;
 let shown = [];               // pairs of a canvas and a row
 let after = () => {};
-let scale = [];               // rows that have one scale
+let scale = [0, 0];           // the lowest and highest place of all rows that have one scale
 
 export const moves = () => moving;
 export const now = () => time;
@@ -26,7 +28,8 @@ export const colourOf = (row) => colour(!row.stable ? "--unstable" : row.regime 
 export function show(pairs, each = () => {}, as = pairs.map(([, row]) => row)) {
   shown = pairs;
   after = each;
-  scale = as;
+  const films = as.map(({ film }) => film).filter(Boolean);
+  scale = [Math.min(0, ...films.flatMap(({ surface, tip }) => [...surface, ...tip])), Math.max(...films.flatMap(({ tip }) => tip))];
   draw();
 }
 
@@ -45,12 +48,9 @@ export function instant(film, periods) {
   return { share, tip: at(film.tip, share), surface: at(film.surface, share), force: at(film.force, share) };
 }
 
-function draw() {
-  const films = shown.filter(([canvas, row]) => row.film && canvas.isConnected);
-  const all = scale.filter((row) => row.film);
-  const lowest = Math.min(0, ...all.flatMap((row) => row.film.surface), ...all.flatMap((row) => row.film.tip));
-  const highest = Math.max(...all.flatMap((row) => row.film.tip));
-  for (const [canvas, row] of films) paint(canvas, row, lowest, highest);
+/** Draws the films: all, or those on the screen. */
+function draw(all = true) {
+  for (const [canvas, row] of shown) if (row.film && canvas.isConnected && (all || inView(canvas))) paint(canvas, row, ...scale);
   after(time);
 }
 
@@ -117,7 +117,7 @@ function tip(pen, x, y, high, ink) {
 }
 
 function step(stamp) {
-  if (moving && shown.length && !document.hidden) { time += SPEED * Math.min(0.1, (stamp - before) / 1000); draw(); }
+  if (moving && shown.length && !document.hidden) { time += SPEED * Math.min(0.1, (stamp - before) / 1000); draw(false); }
   before = stamp;
   requestAnimationFrame(step);
 }

@@ -1,6 +1,7 @@
 // The lever in slow motion: the beam's shape from all its modes, the tip, and the indented sample.
 // Heights are drawn to scale; the lever's length is not.
 
+import { inView } from "./element.js";
 import { t } from "./words.js";
 
 const canvas = document.getElementById("lever");
@@ -84,7 +85,7 @@ function draw() {
 }
 
 function step(now) {
-  if (moving && film) { time += SPEED * Math.min(0.1, (now - before) / 1000); draw(); }
+  if (moving && film) { time += SPEED * Math.min(0.1, (now - before) / 1000); if (inView(canvas)) draw(); }
   before = now;
   requestAnimationFrame(step);
 }

@@ -614,6 +614,19 @@ def test_every_panel_shows_something(page: Any, address: str) -> None:
     until(page, lambda: page.evaluate(drawn) > before)
 
 
+def test_an_axis_has_at_least_two_numbers(page: Any) -> None:
+    ticks = "([from, to, most]) => import('/plot.js').then((m) => m.ticks({ from, to }, most).at.map(([v]) => v))"
+    draw = random.Random(1)
+    for _ in range(200):
+        # Of widths that lie in every decade, around any middle.
+        width = 10 ** draw.uniform(-3, 3)
+        low = draw.uniform(-2, 1) * width
+        most = draw.randint(2, 8)
+        at = page.evaluate(ticks, [low, low + width, most])
+        assert 2 <= len(at) <= max(most + 1, 6), (low, width, most, at)
+        assert low - 1e-6 * width <= at[0] and at[-1] <= low + (1 + 1e-6) * width
+
+
 def test_its_numbers_are_the_servers(page: Any, address: str) -> None:
     opened(page, address, "preset=paper")
     values = {row["name"]: row["value"] for row in motion(address)["observables"]}

@@ -135,7 +135,11 @@ export function ticks(axis, most) {
   }
   const rough = (high - low) / Math.max(2, most);
   const unit = 10 ** Math.floor(Math.log10(rough));
-  const step = unit * [1, 2, 2.5, 5, 10].find((n) => n * unit >= rough * (1 - 1e-9));
+  const steps = [10, 5, 2.5, 2, 1, 0.5, 0.25].map((n) => n * unit);
+  const widest = steps.findLastIndex((one) => one >= rough * (1 - 1e-9));
+  // A single tick is not a scale: there may be more than `most` then.
+  const within = (one) => Math.floor(high / one + 1e-9) - Math.ceil(low / one - 1e-9) + 1;
+  const step = steps.find((one, k) => k >= widest && within(one) > 1) ?? steps[widest];
   const largest = Math.max(Math.abs(low), Math.abs(high));
   const shift = largest >= 1e5 || largest < 1e-3 ? Math.floor(Math.log10(largest)) : 0;
   const scaled = step / 10 ** shift;
@@ -420,8 +424,8 @@ export function paint(pen, { places, zero, height: tall }, size) {
     pen.save();
     pen.translate(left - place.aside + size, top + high / 2);
     pen.rotate(-Math.PI / 2);
-    const long = width(pen, title, size);
-    write(pen, title, 0, 0, long > 1.25 * high ? size * Math.max(0.7, 1.25 * high / long) : size, 0.5);
+    // Little longer than its panel: the next one's begins there.
+    write(pen, title, 0, 0, size * Math.min(1, Math.max(0.7, 1.1 * high / width(pen, title, size))), 0.5);
     pen.restore();
     if (place.title) write(pen, place.title, left, top - 0.5 * size - (place.entries.length ? 1.3 * size * (place.entries.at(-1).line + 1) : 0), size, 0);
     const lines = (place.entries.at(-1)?.line ?? -1) + 1;

@@ -62,16 +62,16 @@ impl FreeOscillation {
             let (sin, cos) = nanotap_arithmetic::sin_cos(held.phase.to_radians());
             Ok(inverse * Complex::new(cos, -sin))
         };
-        let none = || {
+        let none = |remedy: String| {
             Error::input(
                 format!(
-                    "near {} the free lever has no frequency at which it lags by {}°",
-                    alone.shown(alone.drive_keys()[0], start),
+                    "near the drive's frequency the free lever nowhere lags by {}°",
                     held.phase
                 ),
-                "give another {phase}, or drive the lever at its tip",
+                format!("{remedy}, or drive the lever at its tip"),
             )
         };
+        let other = || none("give another {phase}".to_owned());
         let (mut a, mut b) = (start, start * (1.0 + 1e-6));
         let (mut fa, mut fb) = (turned(a)?.im, turned(b)?.im);
         for _ in 0..STEPS {
@@ -80,7 +80,7 @@ impl FreeOscillation {
             }
             let next = b - fb * (b - a) / (fb - fa);
             if !(next > 0.3 * start && next < 3.0 * start) {
-                return Err(none());
+                return Err(other());
             }
             let moved = (next - b).abs();
             (a, fa) = (b, fb);
@@ -91,8 +91,13 @@ impl FreeOscillation {
             }
         }
         let there = turned(b)?;
-        if !(there.re > 0.0 && there.im.abs() <= 1e-6 * there.re) {
-            return Err(none());
+        if there.im.abs() > 1e-6 * there.re.abs() {
+            return Err(other());
+        }
+        if there.re <= 0.0 {
+            // The higher modes of a driven base answer with the other sign.
+            let opposite = held.phase - 180.0_f64.copysign(held.phase);
+            return Err(none(format!("give {{phase}} {opposite}, as it lags there")));
         }
         let strength = held.amplitude * there.re;
         let model = alone.with_drive(b, strength).model()?;

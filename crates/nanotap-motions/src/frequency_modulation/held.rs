@@ -117,9 +117,12 @@ impl Held {
                 "give drive.free_amplitude, or alpha2",
             ));
         }
-        if !(phase > 0.0 && phase < 180.0) {
+        if !(phase.abs() > 0.0 && phase.abs() < 180.0) {
             return Err(Error::input(
-                format!("a phase of {phase}° cannot be held: it must lie between 0° and 180°"),
+                format!(
+                    "a phase of {phase}° cannot be held: it must lie between 0° and 180°, or -180° and \
+                     0° for a mode that answers the drive with the other sign"
+                ),
                 "give a {phase} of 90",
             ));
         }

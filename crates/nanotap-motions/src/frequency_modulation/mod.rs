@@ -255,7 +255,7 @@ options! {
         #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
         /// Phase lag to keep, in degrees
-        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        #[schemars(range(min = -180, max = 180), extend("x-value" = "DEGREES"))]
         pub phase: f64 = 90.0,
         /// Frequency shift whose distances to find, in units of the case ("-50 Hz") or as omega
         #[schemars(extend("x-value" = "SHIFT"))]

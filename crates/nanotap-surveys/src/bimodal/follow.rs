@@ -133,6 +133,7 @@ pub(super) fn follow(
 
 /// A tone of the lever, with the free lever at its amplitude and the phase that is held.
 fn tone(lever: &Cantilever, index: usize, kind: Loop, phase: f64) -> Result<Tone, Error> {
+    let of_tone = ["first tone", "second tone"][index];
     let mut alone = lever.clone().under_one_tone();
     let strength = lever.get(Parameter::Tone2Amplitude);
     if let (1, Some(ratio)) = (index, lever.further_tones.first()) {
@@ -146,19 +147,20 @@ fn tone(lever: &Cantilever, index: usize, kind: Loop, phase: f64) -> Result<Tone
         phase,
     };
     let key = ["drive.free_amplitude", "drive.second_free_amplitude"][index];
-    let condition = condition.check().map_err(|error| {
-        error
-            .context(format!("{} tone", ["first", "second"][index]))
-            .remedy(format!("give {key}"))
+    let condition = condition
+        .check()
+        .map_err(|error| error.context(of_tone).remedy(format!("give {key}")))?;
+    let free = FreeOscillation::of(&Case::from(alone), condition).map_err(|error| {
+        let of = |option: &str| match (option, index) {
+            ("phase", 1) => "{second_phase}".to_owned(),
+            _ => format!("{{{option}}}"),
+        };
+        error.context(of_tone).written(of)
     })?;
-    let free = FreeOscillation::of(&Case::from(alone), condition)?;
     let away = nanotap_arithmetic::ln(free.frequency / drive[0]).abs();
     if kind.holds_phase() && away > FARTHEST_RESONANCE {
         return Err(Error::input(
-            format!(
-                "no mode of the lever resonates near the {} tone",
-                ["first", "second"][index]
-            ),
+            format!("no mode of the lever resonates near the {of_tone}"),
             "give {modes} or another frequency",
         ));
     }
@@ -465,7 +467,9 @@ impl Follower<'_> {
     fn readings(&self, held: &Held, k: usize) -> Readings {
         let (tone, scales) = (&self.loops.tones[k], &self.view.scales);
         let strength = held.drives().strength[k] / tone.free.strength;
-        let kept = nanotap_arithmetic::sin(tone.free.phase.to_radians());
+        // Of a mode that answers the drive with the other sign, the formulas count from that sign.
+        let sign = if tone.free.phase < 0.0 { 180.0 } else { 0.0 };
+        let kept = nanotap_arithmetic::sin((tone.free.phase + sign).to_radians());
         let stiffness = tone.free.stiffness;
         let [amplitude, resonance] = [tone.free.amplitude, tone.free.frequency];
         // What the free lever loses in a period is π k A²/Q at resonance.
@@ -479,7 +483,7 @@ impl Follower<'_> {
             shift: tone.holds_phase.then_some(shift * scales.frequency),
             amplitude: held.amplitude(k) * scales.length,
             free_amplitude: strength * amplitude / kept * scales.length,
-            phase: held.phase(k).to_radians(),
+            phase: (held.phase(k) + sign).to_radians(),
             at_resonance: !tone.holds_phase && away.abs() <= AT_RESONANCE,
         }
     }

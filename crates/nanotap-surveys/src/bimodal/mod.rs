@@ -76,10 +76,10 @@ options! {
         /// Loop of the second tone; default: fm
         pub second: Option<Loop> = None,
         /// Phase lag of the first tone to hold, in degrees
-        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        #[schemars(range(min = -180, max = 180), extend("x-value" = "DEGREES"))]
         pub phase: f64 = 90.0,
         /// Phase lag of the second tone to hold, in degrees
-        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        #[schemars(range(min = -180, max = 180), extend("x-value" = "DEGREES"))]
         pub second_phase: f64 = 90.0,
         /// First distance, as in "30 nm"; default: where the lever is free
         #[schemars(extend("x-value" = "DISTANCE"))]

@@ -321,6 +321,20 @@ fn contradictions_are_refused_by_name() {
         Loop::Am,
     );
     assert!(one.contains("no mode of the lever resonates"), "{one}");
+    // Its second mode answers a driven base with the other sign.
+    let based = run(
+        &[
+            "drive.second_free_amplitude=1 nm",
+            "gap.tip=17 nm",
+            "drive.actuation=base",
+        ],
+        Loop::Am,
+    );
+    assert!(
+        based.contains("second tone: near the drive's frequency")
+            && based.contains("give second_phase -90"),
+        "{based}"
+    );
     let far = run(
         &["drive.second_free_amplitude=1 nm", "gap.tip=1 um"],
         Loop::Am,

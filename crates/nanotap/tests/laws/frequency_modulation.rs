@@ -590,3 +590,48 @@ fn impossible_amplitudes_and_phases_are_refused() {
     let loss = std::f64::consts::PI * free.stiffness * 1e-6 / 200.0;
     assert!((free.loss / loss - 1.0).abs() < 1e-9);
 }
+
+/// The second mode of a lever answers a base that moves with the other sign than a force at its tip: the same
+/// motions have the opposite phase, and the same frequency shift.
+#[test]
+fn a_higher_mode_of_a_driven_base_is_held_at_the_opposite_phase() {
+    let shifts = [
+        ("drive.actuation=tip", 90.0),
+        ("drive.actuation=base", -90.0),
+    ]
+    .map(|(actuation, phase)| {
+        let words = [
+            "modes=2",
+            "drive.frequency=627 kHz",
+            "sample.law=van-der-waals",
+            "sample.hamaker=2e-19 J",
+            "tip.radius=10 nm",
+            actuation,
+        ];
+        let case = lever((40.0, 400.0, "100 kHz"), (1.0, 3.0), &words);
+        let held = |phase: f64| {
+            let options = FrequencyModulationOptions {
+                from: Some(3e-9.into()),
+                to: Some(1.5e-9.into()),
+                points: 5,
+                phase,
+                ..FrequencyModulationOptions::default()
+            };
+            frequency_modulation(&case, &options, &Control::default())
+        };
+        let refused = held(-phase).unwrap_err().to_string();
+        assert!(
+            refused.contains(&format!("give phase {phase}")),
+            "{refused}"
+        );
+        let report = held(phase).unwrap();
+        let (point, found) = nearest(&report);
+        let closed = &point.observables.as_ref().unwrap();
+        assert!((closed.phase - phase).abs() < 1e-6, "{}", closed.phase);
+        found.frequency_shift
+    });
+    assert!(
+        shifts[0] < 0.0 && (shifts[1] / shifts[0] - 1.0).abs() < 1e-3,
+        "{shifts:?}"
+    );
+}

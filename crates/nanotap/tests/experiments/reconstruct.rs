@@ -156,7 +156,7 @@ fn noise_leaves_the_force_within_a_few_percent() {
     let case = lever(reference);
     for (step, rms_limit, least_limit) in [(1, 0.02, 0.06), (4, 0.05, 0.09)] {
         let mut all = Vec::new();
-        for seed in 1..=4 {
+        for seed in 1..=8 {
             let table = rows(reference, step, [0.02, 0.1], seed);
             let report = reconstructed(&case, table, ReconstructOptions::default());
             all.push(deviations(reference, &report));

@@ -186,7 +186,7 @@ fn a_thin_basin_is_not_passed_over() {
     assert!(upsets(part, found.tip_speed));
     assert!(!upsets(part, 0.998 * found.tip_speed));
     // Smaller knocks, all over the period, by the exact flow.
-    for k in 1..=30 {
+    for k in 1..=60 {
         let [part, size] = [0.754_877_666_246_693, 0.569_840_290_998_053]
             .map(|step: f64| (step * f64::from(k)).fract());
         let size = if k % 2 == 0 { size } else { -size };

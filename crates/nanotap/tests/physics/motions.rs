@@ -152,7 +152,7 @@ fn every_start_goes_to_the_motion_of_a_long_run() {
     let bistable = stated(include_str!("../../../../docs/cases/bistable-lever.toml"));
     let paper = Model::cantilever(&at(20.0).with(Parameter::Alpha1, 0.0)).unwrap();
     let lever = bistable.model().unwrap();
-    for (model, count, long) in [(paper, 64, 1500), (lever, 32, 3000)] {
+    for (model, count, long) in [(paper, 128, 1500), (lever, 64, 3000)] {
         let starts = default_box(&model).unwrap().starts(1, count);
         let map = ModelMap::new(&model);
         let found = census(

@@ -66,13 +66,9 @@ impl Over {
     pub fn parse(given: &str, case: &Case) -> Result<Self, Error> {
         let wrong = |what: &dyn fmt::Display| wrong(given, case, what);
         let form = |what: &str| {
+            let [range, ratios, values] = examples(case);
             wrong(&format_args!(
-                "{what}; {}",
-                if case.is_physical() {
-                    "write it as in gap.tip=10nm:20nm:400, drive.frequency=300kHz:330kHz:50:log, or gap.tip=10nm,12nm"
-                } else {
-                    "write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
-                }
+                "{what}; write it as in {range}, {ratios}, or {values}"
             ))
         };
         let (name, range) = given.split_once('=').ok_or_else(|| form("missing `=`"))?;
@@ -285,13 +281,22 @@ fn key(given: &str, name: &str, case: &Case) -> Result<Key, Error> {
     case.key(name).map_err(|error| wrong(given, case, &error))
 }
 
+/// An axis as a range, in equal ratios and as values, in quantities of the case.
+fn examples(case: &Case) -> [&'static str; 3] {
+    if case.is_physical() {
+        [
+            "gap.tip=10nm:20nm:400",
+            "drive.frequency=300kHz:330kHz:50:log",
+            "gap.tip=10nm,12nm,15nm",
+        ]
+    } else {
+        ["omega=2:4:400", "omega=2:200:50:log", "omega=2,2.5,4"]
+    }
+}
+
 /// The error of an axis that is not valid.
 fn wrong(given: &str, case: &Case, what: &dyn fmt::Display) -> Error {
-    let [range, values] = if case.is_physical() {
-        ["gap.tip=10nm:20nm:400", "gap.tip=10nm,12nm,15nm"]
-    } else {
-        ["omega=2:4:400", "omega=2,2.5,4"]
-    };
+    let [range, _, values] = examples(case);
     Error::option(
         "over",
         format!("`{given}`: {what}"),

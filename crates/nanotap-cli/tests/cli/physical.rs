@@ -55,7 +55,7 @@ fn physical_and_dimensionless_values_are_shown() {
     }
 }
 
-/// What is wrong with an option is said in the quantities of the case.
+/// Errors name the quantities of the case and give values in its units.
 #[test]
 fn refusals_are_in_the_units_of_the_case() {
     let folder = Folder::new();

@@ -91,7 +91,8 @@ impl FreeOscillation {
             }
         }
         let there = turned(b)?;
-        if there.im.abs() > 1e-6 * there.re.abs() {
+        let is_found = there.im.abs() <= 1e-6 * there.re.abs();
+        if !is_found {
             return Err(other());
         }
         if there.re <= 0.0 {

@@ -475,7 +475,7 @@ impl Follower<'_> {
         // What the free lever loses in a period is π k A²/Q at resonance.
         let quality = PI * stiffness * amplitude * amplitude / tone.free.loss;
         let shift = held.drives().frequency[k] - resonance;
-        let away = tone.free_phase - 90.0;
+        let away = tone.free_phase + sign - 90.0;
         Readings {
             stiffness: stiffness * scales.stiffness,
             quality,
